@@ -13,9 +13,9 @@ from keys import default_of, range_of, row, table
 from sphinx_gallery.scrapers import figure_rst
 
 import fpsolve
+from fpsolve.commands import check_case
 from fpsolve.data import plain_unit
 from fpsolve.model.parameters import Parametrised, unit_of
-from fpsolve.workflow import check_case
 
 ROOT = Path(__file__).parents[1]
 CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]
@@ -34,14 +34,10 @@ ROOMS = {
     "theory": "what is known in closed form",
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
-    "results": "what is found for curves, and the numbers of many as one table",
-    "parts": "what a case may ask for of each curve",
-    "study": "cases become results",
-    "output": "results become tables, records and figures",
-    "show": "what is said of a case and of all its curves together",
-    "page": "blocks on a terminal and in HTML",
-    "workflow": "what each command does",
-    "commands": "options that commands share",
+    "solve": "what a case asks of each curve becomes numbers",
+    "results": "numbers become a table and its files",
+    "tell": "a table becomes words and pictures",
+    "commands": "a file for each command",
 }
 
 
@@ -152,7 +148,7 @@ KINDS = {
 # The eigenfunction T of p = 2, which spans decades:
 
 from fpsolve import ExponentSolver
-from fpsolve.output import draw_eigenfunction
+from fpsolve.tell import draw_eigenfunction
 
 # sphinx_gallery_thumbnail_number = -1
 pair = ExponentSolver(case.problem, rtol=1e-4).pair(2.0)

@@ -3,8 +3,8 @@ from . import exponent as exponent
 from . import measured as measured
 from . import model as model
 from . import nonlinear as nonlinear
-from . import output as output
 from . import proofs as proofs
+from . import results as results
 from . import simulation as simulation
 from . import theory as theory
 from .analysis.density import stationary_density as stationary_density
@@ -13,6 +13,7 @@ from .analysis.inverse import design as design
 from .analysis.sensitivity import sensitivities as sensitivities
 from .analysis.stability import boundary as boundary
 from .case.case import load_case as load_case
+from .commands.cases import run as run
 from .errors import CaseError as CaseError
 from .errors import FpsolveError as FpsolveError
 from .errors import NotConverged as NotConverged
@@ -29,10 +30,9 @@ from .model.problem import Problem as Problem
 from .model.systems.plane_system import PlaneSystem as PlaneSystem
 from .model.systems.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
 from .nonlinear.response import stationary_response as stationary_response
-from .output.datasets import open_results as open_results
 from .proofs.questions import prove as prove
+from .results.datasets import open_results as open_results
 from .simulation.estimators import simulate as simulate
-from .workflow.cases import run as run
-from .workflow.explore import explore as explore
+from .tell.explore import explore as explore
 
 __version__: str

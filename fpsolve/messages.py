@@ -1,4 +1,4 @@
-"""What is said of results, as codes with data, from which words are made for Python or for another audience."""
+"""What is said of results, as codes with data, from which words are made."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Severity(StrEnum):
 
 
 class Remedy(StrEnum):
-    """What to do, in the words of Python."""
+    """What to do: keys are those of a case file, and the arguments of Python with the same names."""
 
-    MESH = "use more cells or a wider noise interval, or let the mesh be chosen"
-    CELLS = "use more cells in a given mesh, or a smaller rtol where it is chosen"
-    REACH = "use a mesh that reaches there, or let the mesh be chosen"
-    BUDGET = "use a larger rtol or a larger budget"
+    MESH = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
+    CELLS = "use more cells in [mesh], or a smaller rtol where there is none"
+    REACH = "use a [mesh] that reaches there, or no [mesh]"
+    BUDGET = "use a larger rtol or a larger [budget]"
     MANY = (
-        "use a larger rtol or a larger budget; Λ(2) takes little and bounds it, as Λ(p) <= p Λ(2)/2 for 0 < p < 2 and "
-        "λ <= Λ(2)/2, and `fpsolve.simulation.simulate` gives it with a standard error"
+        "use a larger rtol or a larger [budget]; p = 2 takes little and bounds it, as Λ(p) <= p Λ(2)/2 for 0 < p < 2 "
+        "and λ <= Λ(2)/2, and `fpsolve simulate` gives it with a standard error"
     )
     BESIDE = (
         "ask for p = -0.99 and p = -1.01 instead, as two eigenvalues may meet at p = -1; Λ(-1) is at most the mean of "
@@ -43,16 +43,12 @@ class Remedy(StrEnum):
     BOTH_AXES = "use more cells, in the phase and in the noise"
     PHASE = "use more cells in the phase"
     DEGREES = "use more or higher-degree cells"
-    MESH_FILE = "make one with `write_mesh`"
-    REDUCTION = "or the Ornstein-Uhlenbeck reduction of the noise"
-    NO_REDUCTION = "the unreduced noise keeps Eq. (7)"
-    SIMULATION = "or `fpsolve.simulation.simulate` it"
-    FOLDER = "choose another folder"
-    MEMORY = "use a smaller budget, or fewer processes"
-
-
-Audience = Mapping[Enum, str]
-"""Words for remedies, and templates for codes, in place of those for Python."""
+    MESH_FILE = "make one with `fpsolve mesh`"
+    REDUCTION = 'or treatment = "ou-reduction"'
+    NO_REDUCTION = 'treatment = "exact" keeps Eq. (7)'
+    SIMULATION = "or simulate it, see [monte_carlo] and `fpsolve simulate`"
+    FOLDER = "choose another --out"
+    MEMORY = "use a smaller [budget], or fewer --jobs"
 
 
 @unique
@@ -430,7 +426,7 @@ class Message(str):
     def __new__(cls, code: Code, **data: Any) -> Message:
         """A message of a code; numpy's numbers and arrays become Python's numbers and tuples."""
         known = {key: _python(value) for key, value in data.items()}
-        made = super().__new__(cls, _words(code, known, {}))
+        made = super().__new__(cls, _words(code, known))
         made.__dict__.update(code=code, data=MappingProxyType(known))
         return made
 
@@ -463,10 +459,6 @@ class Message(str):
     def tells_of(self, code: Code) -> bool:
         """Whether it, or a reason of it, has a code."""
         return self.code is code or any(each.tells_of(code) for each in self.reasons())
-
-    def words(self, audience: Audience) -> str:
-        """The text in the words of an audience."""
-        return _words(self.code, self.data, audience)
 
     def advising(self, remedy: str | None) -> Message:
         """The message with another remedy, or without one."""
@@ -517,18 +509,13 @@ def escaped(text: str) -> str:
     )
 
 
-def _words(code: Code, data: Mapping[str, Any], audience: Audience) -> str:
-    template, writer = audience.get(code, code.template), _Writer(audience)
-    if data.get("remedy") is not None and "{remedy" not in template:
-        template += "; {remedy}"
-    return writer.vformat(template, (), data)
+def _words(code: Code, data: Mapping[str, Any]) -> str:
+    ending = "; {remedy}" if data.get("remedy") is not None and "{remedy" not in code.template else ""
+    return _Writer().vformat(code.template + ending, (), data)
 
 
 class _Writer(Formatter):
-    """Fills templates for an audience."""
-
-    def __init__(self, audience: Audience) -> None:
-        self._audience = audience
+    """Fills templates."""
 
     def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
         return kwargs.get(str(key))
@@ -537,14 +524,10 @@ class _Writer(Formatter):
         if format_spec.startswith("?"):
             present, _, absent = format_spec[1:].partition("¦")
             return absent if value is None or value is False else present
-        kind = type(value)
-        if kind is tuple:
+        if type(value) is tuple:
             separator = "\n" if Message in map(type, value) else ", "
             return separator.join(self.format_field(each, format_spec) for each in value)
-        if kind is Message:
-            return value.words(self._audience)
-        text = "" if value is None else format(value, format_spec)
-        return self._audience.get(value, text) if kind is Remedy else text
+        return str(value) if type(value) is Message else "" if value is None else format(value, format_spec)
 
 
 def _python(value: Any) -> Any:

@@ -17,11 +17,11 @@ from fpsolve import PlaneSystem, Problem, load_case
 from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
-from fpsolve.output.known import names_of, read_into, record_of
-from fpsolve.parts.question import Job, Numerics
-from fpsolve.results import CurveResult, SimulatedCurve
-from fpsolve.study.solve import everything, result_of, solve_curve
-from fpsolve.workflow.simulate import simulate_curve
+from fpsolve.results.known import names_of, read_into, record_of
+from fpsolve.solve import CurveResult, SimulatedCurve
+from fpsolve.solve.question import Job, Numerics
+from fpsolve.solve.sets import everything, result_of, solve_curve
+from fpsolve.solve.simulate import simulate_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
@@ -58,10 +58,10 @@ LEAN = "output={ quantities = ['lyapunov_exponent'] }"
 HOPELESS = "mesh={ phi_cells = 1, phi_degree = 2, xi_cells = 2, xi_degree = 3 }"
 """Sets a mesh that resolves nothing."""
 COSTLY = (
-    "fpsolve.parts.sensitivities.solve_sensitivities",
-    "fpsolve.parts.excursions.solve_excursion",
-    "fpsolve.parts.response.solve_response",
-    "fpsolve.parts.directions.densities",
+    "fpsolve.solve.sensitivities.solve_sensitivities",
+    "fpsolve.solve.excursions.solve_excursion",
+    "fpsolve.solve.response.solve_response",
+    "fpsolve.solve.directions.densities",
 )
 """What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}

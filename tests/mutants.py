@@ -248,7 +248,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "L8 critical damping by the fit, not by the measured density",
-        "workflow/noise.py",
+        "solve/noise.py",
         "values[i] *= 1 + each.relative",
         "values[i] *= 1",
         "noise",
@@ -256,17 +256,15 @@ DEFECTS: tuple[Defect, ...] = (
     Defect("L9 g is 9.81 m/s²", "measured/signals.py", '"g": 9.80665}', '"g": 9.81}', "noise"),
     Defect(
         "L10 a verdict within its error is given",
-        "workflow/noise.py",
+        "tell/noise.py",
         "if abs(each.value) <= each.deviation:",
         "if each.value == 0:",
         "noise",
     ),
-    Defect(
-        "L11 a file of any size is read", "reading.py", "if about.st_size > most:", "if about.st_size < 0:", "large"
-    ),
+    Defect("L11 a file of any size is read", "files.py", "if about.st_size > most:", "if about.st_size < 0:", "large"),
     Defect(
         "R1 cells of the plane are cubes in a VTK file",
-        "vtk.py",
+        "results/vtk.py",
         "steps = square if numbers.ndim == 2 else",
         "steps = square if numbers.ndim != 2 else",
         "vtk",
@@ -385,7 +383,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R19 a table in a terminal has no room between columns",
-        "page/terminal.py",
+        "tell/terminal.py",
         "if sum(needed(i) + 3 for i in kept) + 1 <= self.width:",
         "if sum(needed(i) - 3 for i in kept) + 1 <= self.width:",
         "terminal",
@@ -413,14 +411,14 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R24 a number without an error has decimals of one",
-        "results/text.py",
+        "tell/text.py",
         '    if error <= 0:\n        return f"{value:g}"',
         '    if error > 0:\n        return f"{value:g}"',
         "noise",
     ),
     Defect(
         "R25 a sign that an error leaves open counts as growth",
-        "show/verdict.py",
+        "tell/verdict.py",
         "np.sign(value), 0.0)",
         "np.sign(value), 1.0)",
         "verdict",
@@ -441,14 +439,14 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R28 an index that needs one ray is reported as missing",
-        "study/solve.py",
+        "solve/sets.py",
         "if job.numerics.is_stated or not message.tells_of",
         "if job.numerics.is_stated or message.tells_of",
         "study",
     ),
     Defect(
         "R29 a bound that was not tried is a failure",
-        "workflow/prove.py",
+        "solve/prove.py",
         "return all(each is None or each.is_met for each in (*(found",
         "return all(each is None and each.is_met for each in (*(found",
         "prove",

@@ -23,6 +23,7 @@ from pydantic import (
 )
 
 from fpsolve.arrays import FloatArray, shortened, shown
+from fpsolve.case.explain import explain, is_list, refuse
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
@@ -57,7 +58,6 @@ from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
-from fpsolve.explain import explain, is_list, refuse
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget, Method
 from fpsolve.exponent.quantities import (

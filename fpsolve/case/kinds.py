@@ -16,8 +16,8 @@ from pydantic import ValidationError, ValidationInfo, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import InitErrorDetails
 
+from fpsolve.case.explain import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.case.matrices import with_matrices
-from fpsolve.explain import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
 from fpsolve.model.faults import TableError, fields_of, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.noises.several import noises_of

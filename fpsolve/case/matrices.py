@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from fpsolve.arrays import FloatArray, real_array, shown
-from fpsolve.explain import refuse
+from fpsolve.case.explain import refuse
+from fpsolve.files import Unreadable, Words, read_bytes
 from fpsolve.model.systems.modal import MOST_MODES
-from fpsolve.reading import Unreadable, Words, read_bytes
 
 KEYS = ("mass", "stiffness", "damping", "gyroscopic", "circulatory", "stiffness_noise", "damping_noise")
 """Keys of [system] that may name a file."""

@@ -14,10 +14,7 @@ from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shortened
-from fpsolve.case.kinds import parameters_of
-from fpsolve.case.sections import MAX_MOMENTS, Sweep, Values, flat
-from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
-from fpsolve.explain import (
+from fpsolve.case.explain import (
     DEPENDENT,
     Refusal,
     explain,
@@ -30,9 +27,12 @@ from fpsolve.explain import (
     shown_with_kind,
     too_long,
 )
+from fpsolve.case.kinds import parameters_of
+from fpsolve.case.sections import MAX_MOMENTS, Sweep, Values, flat
+from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
+from fpsolve.files import Unreadable, Words, read_text
 from fpsolve.model.faults import accepted, choices, table_of
 from fpsolve.model.parameters import STRICT, meaning_of
-from fpsolve.reading import Unreadable, Words, read_text
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
 _START = "its first row must name keys, as in noise.D0,noise.tau0"

@@ -20,9 +20,9 @@ from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
+from fpsolve.case.explain import Refusal, nearest, quoted, shown
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.read_vary import column_of
-from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.case.sections import (
     EXCURSIONS,
     RESPONSE,
@@ -40,7 +40,6 @@ from fpsolve.case.sections import (
 )
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.errors import FpsolveError, MeshError
-from fpsolve.explain import Refusal, nearest, quoted, shown
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.fem.mesh import CylinderMesh
@@ -108,7 +107,7 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
         method = choose(problem)
         for each in extremes if method.has_pairs else p.tolist():
             if told := method.reason(each):
-                return told.words(CASE_WORDS)
+                return told
     return ""
 
 
@@ -119,7 +118,7 @@ def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusa
             made = mesh.mesh(context.get("folder", Path()))
             reason = _misfit(made, valid) if made and {"system", "noise", "budget", "vary"} <= valid.keys() else ""
     except MeshError as error:
-        reason = error.message.words(CASE_WORDS)
+        reason = error.message
     except (OSError, ValueError) as error:
         reason = str(error)
     if reason:
@@ -159,7 +158,7 @@ def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) ->
     try:
         faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
     except FpsolveError as error:
-        yield (), None, place + error.message.words(CASE_WORDS)
+        yield (), None, place + error.message
         return
     except ValueError:  # which [vary] tells of
         pass
@@ -202,7 +201,7 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     if problem and output.lists_quantities:
         for name in {*(output.names or ())} & INDICES.keys():
             if told := choose(problem).reason(0.0, INDICES[name].symbol):
-                yield ("quantities",), output.quantities, told.words(CASE_WORDS)
+                yield ("quantities",), output.quantities, told
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
     figure: FigureSection = valid.get("figure", FigureSection())

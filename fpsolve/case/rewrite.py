@@ -11,9 +11,9 @@ from typing import Any
 import tomlkit
 
 from fpsolve.case.case import Case
+from fpsolve.case.explain import is_number
 from fpsolve.case.keys import get, put
 from fpsolve.case.toml import document_of, loads
-from fpsolve.explain import is_number
 
 
 def rewritten(

@@ -28,9 +28,7 @@ from fpsolve.analysis.axis import Axis, Scale, check_range
 from fpsolve.analysis.excursions import STATIONARY
 from fpsolve.analysis.target import EXAMPLES, Target, target_of
 from fpsolve.arrays import FloatArray
-from fpsolve.case.keys import leaves
-from fpsolve.errors import MeshError
-from fpsolve.explain import (
+from fpsolve.case.explain import (
     BY_KIND,
     LIST,
     NUMBER,
@@ -43,6 +41,8 @@ from fpsolve.explain import (
     shown,
     shown_with_kind,
 )
+from fpsolve.case.keys import leaves
+from fpsolve.errors import MeshError
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
@@ -63,7 +63,7 @@ EIGENFUNCTIONS = "eigenfunctions"
 OF_MOMENTS = DERIVATIVE.name, RATE_FUNCTION.name
 """What follows from Λ(p)."""
 PARTS: tuple[str, ...] = EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS
-"""What else may be asked for: the names of files of `fpsolve/parts`, each with a question, in the order of work."""
+"""What else may be asked for: the names of files of `fpsolve/solve`, each with a question, in the order of work."""
 QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
 """What may be asked for."""
 EVERYTHING = "all"

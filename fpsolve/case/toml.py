@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from fpsolve.arrays import shortened
 from fpsolve.case.keys import get, put
 from fpsolve.errors import CaseError, Fault
+from fpsolve.files import Unreadable, Words, read_text
 from fpsolve.messages import is_control
 from fpsolve.model.parameters import without_unit
-from fpsolve.reading import Unreadable, Words, read_text
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*+")
 _KEY = re.compile(r'"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|[A-Za-z0-9_-]+')

@@ -9,10 +9,10 @@ from typing import Any
 from pydantic import ValidationInfo
 
 from fpsolve.analysis.spreads import Law, deviation_of, laws_of
+from fpsolve.case.explain import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.sections import flat
 from fpsolve.case.vary import Vary
-from fpsolve.explain import DEPENDENT, Refusal, nearest, refuse, shown, shown_with_kind
 from fpsolve.model.problem import Problem
 
 _EXAMPLE = '"noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'

@@ -1,4 +1,11 @@
+from .cases import Outcome as Outcome
+from .cases import run_case as run_case
+from .chart import chart_case as chart_case
+from .check import check_case as check_case
+from .noise import noise_case as noise_case
 from .options import Options as Options
 from .options import Reporting as Reporting
 from .options import Working as Working
 from .options import Writing as Writing
+from .prove import prove_case as prove_case
+from .simulate import simulate_case as simulate_case

@@ -2,9 +2,85 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+from pathlib import Path
 from time import monotonic
 
+from fpsolve.case.case import Case
+from fpsolve.commands.interrupts import kept, saying_if_interrupted
 from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Reporting
+from fpsolve.files import writable
+from fpsolve.pool import SERIAL, Pool
+from fpsolve.results.chart import FILES, write_chart
+from fpsolve.results.folders import CHART, own_folder
+from fpsolve.solve.chart import (
+    LINE_RECORDS,
+    Chart,
+    begun_lines,
+    dear_lines,
+    key_of_line,
+    recalled,
+    refuse_no_chart,
+    scans_of,
+    solve_chart,
+)
+from fpsolve.solve.records import Records
+from fpsolve.tell.chart import chart_figure, show, traced
+from fpsolve.tell.notes import note_on
+from fpsolve.tell.progress import NODES as SCANNED
+from fpsolve.tell.progress import POINTS, SILENT, Phase, Watch
+from fpsolve.tell.reports import shown_at_the_end, write_report
+from fpsolve.tell.terminal import print_blocks
+
+
+def chart_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool = SERIAL,
+    watch: Watch = SILENT,
+) -> Chart:
+    """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
+
+    The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
+    solved or simulated with other parameters; but lines that it has finished are not traced again.
+
+    Args:
+        pool: who scans the plane.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: the case has no chart, or several curves; nothing is written.
+        KeyboardInterrupt: its text says what is kept; the figure shows that.
+    """
+    refuse_no_chart(case)
+    chart, lines, started = Chart((), ()), begun_lines(case), datetime.now(UTC)
+
+    def done() -> str:
+        count = sum(len(line.traces) for line in chart.lines)
+        return kept(count, f"branch{'es' if count != 1 else ''} of {len(chart.closed_forms) or 'its'} lines", folder)
+
+    def draw() -> None:
+        if chart.lines:
+            with writable(folder):
+                chart_figure(case, chart).write(folder)
+            write_report(case, folder, watch, show(case, chart), started=started, files=FILES, complete=chart.complete)
+
+    with (
+        own_folder(case, out, (CHART,)) as folder,
+        saying_if_interrupted(done),
+        watch.bar(Phase(case.name, "scan", sum(line.nodes**2 for line in lines), SCANNED)) as progress,
+        watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
+        writable(folder),
+        pool,
+    ):
+        records = Records(folder / LINE_RECORDS)
+        keys = {key_of_line(case, line): line for line in lines}
+        lines = [recalled(records, *each) for each in keys.items()]
+        with shown_at_the_end(draw):
+            for chart in solve_chart(case, lines, scans_of(keys, records, pool), progress=progress, stepped=stepped):
+                write_chart(case, chart, folder)
+    return chart
 
 
 def chart(
@@ -20,9 +96,6 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.notes import note_on
-    from fpsolve.workflow.chart import chart_case, dear_lines, refuse_no_chart, show, traced
 
     code, loaded = 0, options.load(cases)
     for case in loaded:

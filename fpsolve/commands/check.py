@@ -2,12 +2,58 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from fpsolve.case.case import Case, Curve
+from fpsolve.commands.interrupts import ANEW, kept, of_curves, saying_if_interrupted
 from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_WORK, Cases, Working
 from fpsolve.messages import Severity
+from fpsolve.pool import SERIAL, Pool
+from fpsolve.solve.check import (
+    Checked,
+    compare,
+    compare_with_hierarchy,
+    compared,
+    even_moments,
+    expected,
+    refuse_no_hierarchy,
+)
+from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.question import Job, Numerics
+from fpsolve.tell.check import agreement, show
+from fpsolve.tell.notes import notes
+from fpsolve.tell.progress import SETS, SILENT, Phase, Watch
+from fpsolve.tell.terminal import print_blocks
+
+
+def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool = SERIAL, watch: Watch = SILENT) -> Checked:
+    """Solve what a case expects, and compare; nothing is written.
+
+    With `by_hierarchy` Λ of its even p is compared with the moment hierarchy.
+    """
+    found: list[CurveResult] = []
+    numerics = replace(Numerics.of(case), is_stated=True)
+
+    def job(curve: Curve) -> Job:
+        even = {MOMENTS.name: {"p": even_moments(case).tolist(), "slopes": True}}
+        asked = even if by_hierarchy else expected(case, curve.varied)
+        return Job(curve, asked, numerics, case.vary.line_of(curve.number))
+
+    with (
+        saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
+        watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
+        pool,
+    ):
+        for _, result in pool.run(compared, map(job, case.curves())):
+            found.append(result)
+            progress(failed=result.status.fails)
+    found.sort(key=lambda result: result.curve.number)
+    comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
+    return Checked(found, comparisons)
 
 
 def check(
@@ -26,9 +72,6 @@ def check(
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.notes import notes
-    from fpsolve.workflow.check import agreement, check_case, refuse_no_hierarchy, show
 
     code, loaded = 0, options.load(cases)
     for case in loaded if hierarchy else ():

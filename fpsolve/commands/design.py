@@ -2,12 +2,45 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
+from pathlib import Path
 from time import monotonic
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from fpsolve.analysis.axis import Axis
+from fpsolve.case.case import Case
+from fpsolve.commands.interrupts import ANEW, saying_if_interrupted
 from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_FILES, Cases, Writing
+from fpsolve.files import writable
+from fpsolve.results.design import write_design
+from fpsolve.results.folders import DESIGNED, own_folder
+from fpsolve.results.tables import facts_of
+from fpsolve.solve.design import DesignOutcome, solve_design, wanted_of
+from fpsolve.tell.blocks import Note
+from fpsolve.tell.design import found_of, show
+from fpsolve.tell.progress import SOLVES, Phase, Watch
+from fpsolve.tell.terminal import print_blocks
+
+
+def design_case(case: Case, target: str, by: tuple[Axis, ...], out: Path, *, watch: Watch) -> DesignOutcome:
+    """Find the design of a case, see `wanted_of`; write design.json and, where there is one, design.toml.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        KeyboardInterrupt: nothing is kept.
+    """
+    started = datetime.now(UTC)
+    with (
+        own_folder(case, out, (DESIGNED,)) as folder,
+        saying_if_interrupted(lambda: "; nothing is kept", ANEW),
+        writable(folder),
+    ):
+        with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
+            found = solve_design(case, target, by, progress)
+        write_design(case, found, folder, facts_of(case, started))
+    return found
 
 
 def design(
@@ -40,9 +73,6 @@ def design(
         stop: Its largest value, one for each --by; twice its value if omitted.
         json: Print design.json, one line for each case.
     """
-    from fpsolve.page.page import Note
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.workflow.design import design_case, found_of, show, wanted_of
 
     code, loaded = 0, options.load(cases)
     wanted = [wanted_of(case, target, by or (), start or (), stop or ()) for case in loaded]

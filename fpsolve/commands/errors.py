@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 
-from fpsolve.case.remedies import CASE_WORDS
 from fpsolve.messages import escaped, message_of
 
 
@@ -15,7 +14,7 @@ def print_error(text: str) -> None:
     from rich.text import Text
 
     try:
-        Console(stderr=True).print(Text(escaped(message_of(text).words(CASE_WORDS))), style="bold red", soft_wrap=True)
+        Console(stderr=True).print(Text(escaped(message_of(text))), style="bold red", soft_wrap=True)
     except (OSError, SystemExit):  # there is no place left to say it
         drop_blocked_output()
 

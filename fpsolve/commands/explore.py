@@ -28,8 +28,8 @@ def explore(
     """
     import webbrowser
 
-    from fpsolve.page.local import LocalPage
-    from fpsolve.workflow.explore import Explorer
+    from fpsolve.tell.explore import Explorer
+    from fpsolve.tell.local import LocalPage
 
     [loaded] = options.load([case])
     with LocalPage(Explorer(loaded, f"load_case({loaded.path.name!r}).problem").answer) as page:

@@ -13,12 +13,77 @@ from cyclopts import Parameter
 
 from fpsolve.commands.options import NOT_CONVERGED, Count, Options
 from fpsolve.errors import FpsolveError
+from fpsolve.fem.factors import one_thread
+from fpsolve.files import alone, writable, write_json, write_text
+from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
+from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
+from fpsolve.measured.reading import checked_scale
+from fpsolve.measured.signals import SIGNALS, factor_of, powers
+from fpsolve.measured.spectrum import UNITS
+from fpsolve.measured.units import GRAVITY
 from fpsolve.messages import escaped
+from fpsolve.results.noise import case_of, noise_sections, summary
+from fpsolve.solve.noise import (
+    FILES,
+    STEPS_OF_A_FIT,
+    Modes,
+    NoiseOutcome,
+    Wanted,
+    measure,
+    natural_frequencies,
+    refuse_wrong_case,
+)
+from fpsolve.tell.noise import Convention, draw_noise, show
+from fpsolve.tell.progress import SILENT, SOLVES, Phase, Watch
+from fpsolve.tell.solved import last_line
+from fpsolve.tell.terminal import print_blocks
 
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
-    from fpsolve.measured import Record, Spectrum
-    from fpsolve.workflow.noise import Modes, Wanted
+    from fpsolve.solve.noise import Modes
+
+
+def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> list[str]:
+    """noise.json, noise.png, noise.pdf, and noise.toml where there is a system: their names."""
+    text = case_of(outcome, folder)
+    write_json(folder / "noise.json", summary(outcome, source))
+    if text:
+        write_text(folder / "noise.toml", text)
+    else:  # of other options
+        (folder / "noise.toml").unlink(missing_ok=True)
+    draw_noise(outcome, source, shown, folder)
+    return [name for name in FILES if text or name != "noise.toml"]
+
+
+def noise_case(
+    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
+) -> tuple[NoiseOutcome, Path, list[str]]:
+    """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    Args:
+        data, wanted: see `measure`.
+        source: the file.
+        shown: how densities are shown.
+        out: where the folder is made.
+        watch: of the progress, with a bar for the fit and what it means.
+
+    Returns:
+        What became of it, the folder, and the names of the files.
+
+    Raises:
+        FpsolveError: there is no fit; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+    """
+    folder = out / source.name  # with its ending, so that it is none of a case
+    try:
+        with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
+            outcome = measure(data, wanted, progress)  # the arrays are small
+    except FpsolveError as error:
+        raise FpsolveError(f"{source}: {error}") from None
+    with alone(folder), writable(folder):
+        names = write_noise(outcome, source, shown, folder)
+    return outcome, folder, names
+
 
 CLOSE = 0.02
 """By which share of it two statements of a frequency may differ."""
@@ -110,9 +175,6 @@ def measurement_of(
     Raises:
         FpsolveError: the options contradict each other, or a file cannot be read.
     """
-    from fpsolve.measured import read_record, read_spectrum
-    from fpsolve.measured.signals import SIGNALS
-    from fpsolve.workflow.noise import Wanted, refuse_wrong_case
 
     of = stated.of or stated.noise_in or "stiffness"
     place = SIGNALS[of].noise_in
@@ -182,9 +244,6 @@ def _refuse_stated(stated: Statement, names: Sequence[str], told: str) -> None:
 
 def _named(stated: Statement, of: str, near: float) -> Spectrum:
     """The density that is named, in the unit of its signal."""
-    from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
-    from fpsolve.measured.reading import checked_scale
-    from fpsolve.measured.signals import SIGNALS, factor_of, powers
 
     assert stated.named is not None
     try:
@@ -205,10 +264,6 @@ def _named(stated: Statement, of: str, near: float) -> Spectrum:
 def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
     import numpy as np
-
-    from fpsolve.measured.spectrum import UNITS
-    from fpsolve.measured.units import GRAVITY
-    from fpsolve.workflow.noise import Modes, natural_frequencies
 
     restitution, zeta = stated.restitution, stated.damping_ratio
     if zeta is not None and math.isnan(zeta):
@@ -261,8 +316,6 @@ def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) ->
     Raises:
         FpsolveError: the file is none, there are more than two modes, or a number is none of a row.
     """
-    from fpsolve.measured import read_modes
-    from fpsolve.workflow.noise import Modes
 
     found = read_modes(path)
     for number in numbers:
@@ -300,9 +353,6 @@ def noise(
         out: Folder for the results.
         json: Print noise.json in one line.
     """
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.results import last_line
-    from fpsolve.workflow.noise import Convention, noise_case, noise_sections, show
 
     start = monotonic()
     case = Options().load([stated.case])[0] if stated.case else None

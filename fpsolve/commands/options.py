@@ -21,7 +21,7 @@ from fpsolve.messages import Severity
 if TYPE_CHECKING:
     from fpsolve.case.case import Case
     from fpsolve.pool import Pool
-    from fpsolve.workflow.progress import Watch
+    from fpsolve.tell.progress import Watch
 
 CHECK_FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3
 """Exit codes of commands."""
@@ -84,8 +84,8 @@ class Options:
 
     def watch(self, *, is_json: bool = False) -> Watch:
         """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-        from fpsolve.page.terminal import print_blocks
-        from fpsolve.workflow.progress import Bars, Watch
+        from fpsolve.tell.progress import Bars, Watch
+        from fpsolve.tell.terminal import print_blocks
 
         if self.quiet:
             return Watch(noted=partial(print_blocks, severities=[Severity.FAILURE]), said=print_blocks)
@@ -114,8 +114,8 @@ class Writing(Options):
 
     def print_written(self, case: Case, what: str, seconds: float, known: str = "") -> None:
         """Print where the results of a case are, and how long that took."""
-        from fpsolve.page.terminal import print_blocks
-        from fpsolve.show.results import last_line
+        from fpsolve.tell.solved import last_line
+        from fpsolve.tell.terminal import print_blocks
 
         print_blocks([last_line(self.out / case.name, what, seconds, known)])
 

@@ -2,16 +2,91 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from pathlib import Path
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from fpsolve.case.case import Case
 from fpsolve.commands.errors import print_error
+from fpsolve.commands.interrupts import kept, saying_if_interrupted
 from fpsolve.commands.options import ALL_OPTIONS, CHECK_FAILED, NOT_CONVERGED, Reporting
 from fpsolve.errors import FpsolveError
+from fpsolve.files import writable
 from fpsolve.messages import escaped
+from fpsolve.pool import SERIAL, Pool
+from fpsolve.results.folders import PROVEN, own_folder
+from fpsolve.results.prove import PROOF, write_proof
+from fpsolve.solve.prove import (
+    PROVEN_BOUNDS,
+    PROVEN_RECORDS,
+    Answer,
+    CurveProof,
+    answer,
+    asked_of,
+    check_proof,
+    gathered,
+    is_kept,
+    key_of_bounds,
+    questions,
+    refuse_unprovable_case,
+)
+from fpsolve.solve.records import Records, answered
+from fpsolve.tell.progress import BOUNDS, SILENT, Phase, Watch
+from fpsolve.tell.prove import show
+from fpsolve.tell.reports import shown_at_the_end, write_report
+from fpsolve.tell.solved import done_of
+from fpsolve.tell.terminal import print_blocks
+
+
+def prove_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    width: float | None = None,
+    pool: Pool = SERIAL,
+    watch: Watch = SILENT,
+) -> list[CurveProof]:
+    """Prove bounds on Λ at every p of every curve, and on λ and δ_p; write proof.json into `out`/<case>/.
+
+    Args:
+        width: wanted upper − lower; 1e-7 of the scale of each number if None.
+        pool: who proves.
+
+    Raises:
+        FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        KeyboardInterrupt: its text says what is kept.
+    """
+    refuse_unprovable_case(case, width)
+    answers, proofs, total = list[Answer](), list[CurveProof](), len(asked_of(case)) * case.planned
+    started = datetime.now(UTC)
+
+    def finish() -> None:
+        proofs[:], is_whole = gathered(case, answers), len(answers) == total
+        if proofs:
+            with writable(folder):
+                write_proof(case, proofs, folder, is_whole=is_whole)
+            write_report(case, folder, watch, show(case, proofs), started=started, files=[PROOF], complete=is_whole)
+
+    with (
+        own_folder(case, out, (PROVEN,)) as folder,
+        saying_if_interrupted(lambda: kept(len(answers), f"of {total} bounds", folder)),
+        watch.bar(Phase(case.name, "proving", total, BOUNDS)) as progress,
+        pool,
+        shown_at_the_end(finish),
+    ):
+        records, how = (
+            Records(folder / PROVEN_RECORDS),
+            dict[str, Any](kind=PROVEN_BOUNDS, key=key_of_bounds, keeps=is_kept),
+        )
+        for _, found, is_known in answered(records, pool, answer, questions(case, width), **how):
+            answers.append(found)
+            progress(failed=not found.is_proven, known=is_known)
+    return proofs
+
 
 ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)]
 
@@ -37,9 +112,6 @@ def prove(
         width: Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number.
         check: Prove nothing, but verify a proof.json from its certificates alone.
     """
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.results import done_of
-    from fpsolve.workflow.prove import check_proof, prove_case, refuse_unprovable_case, show
 
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")

@@ -39,12 +39,12 @@ def run(
         everything: Compute everything, as quantities = "all" in [output].
         table: Print every number of up to ten curves, also Λ(p) at more than 12 p.
     """
-    from fpsolve.output.tables import whole_summary
-    from fpsolve.page.terminal import print_blocks
-    from fpsolve.show.notes import left_out
-    from fpsolve.show.results import done_of, known_of
-    from fpsolve.workflow.cases import run_case
-    from fpsolve.workflow.simulate import refuse_obstacles
+    from fpsolve.commands.cases import run_case
+    from fpsolve.results.tables import whole_summary
+    from fpsolve.solve.simulate import refuse_obstacles
+    from fpsolve.tell.notes import left_out
+    from fpsolve.tell.solved import done_of, known_of
+    from fpsolve.tell.terminal import print_blocks
 
     code = 0
     loaded = options.load(cases, {"--all": 'output.quantities="all"'} if everything else {})

@@ -2,11 +2,132 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import partial
+from itertools import chain
+from pathlib import Path
 from time import monotonic
+from typing import Any
 
+from fpsolve.case.case import Case
 from fpsolve.commands.errors import print_error
+from fpsolve.commands.interrupts import AGAIN, kept, of_curves, saying_if_interrupted
 from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Reporting
+from fpsolve.files import writable
+from fpsolve.pool import SERIAL, Pool
+from fpsolve.results.folders import SIMULATED, own_folder
+from fpsolve.results.simulate import SIMULATION, write_simulation
 from fpsolve.signals import INTERRUPTED
+from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.solve.question import idle
+from fpsolve.solve.records import Records, answered
+from fpsolve.solve.simulate import (
+    RECORDS,
+    form_of_record,
+    is_finished,
+    refuse_obstacles,
+    simulation_key,
+    simulation_of,
+    simulation_steps,
+)
+from fpsolve.tell.notes import MONTE_CARLO, notes
+from fpsolve.tell.progress import PERCENT, SILENT, Phase, Watch
+from fpsolve.tell.reports import write_report
+from fpsolve.tell.simulate import show, simulated_response_figure
+from fpsolve.tell.solved import done_of, known_of
+
+
+@dataclass(eq=False)
+class Simulations:
+    """The simulations of the curves of a case, of which an earlier run may have kept some.
+
+    Attributes:
+        case: whose curves these are.
+        simulated: what is done, in the order of the curves.
+        interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
+        known: how many an earlier run had finished.
+    """
+
+    case: Case
+    simulated: list[SimulatedCurve] = field(default_factory=list)
+    interruption: str = ""
+    known: int = 0
+
+    def run(
+        self, folder: Path, pool: Pool, watch: Watch, results: Sequence[CurveResult] = (), *, is_fresh: bool
+    ) -> None:
+        """Simulate the curves, write what is found of each, and show it.
+
+        Args:
+            folder: where they are written and kept.
+            pool: whose other machines simulate; all processors of this one where there are none.
+            results: what is solved of the same curves.
+            is_fresh: whether to do all of them again.
+        """
+        case, is_elsewhere = self.case, pool.is_elsewhere
+        asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
+        how: dict[str, Any] = {"kind": form_of_record(), "key": partial(simulation_key, **asked), "keeps": is_finished}
+        work = Phase(case.name, "simulation", sum(map(simulation_steps, case.curves())), PERCENT)
+        with watch.bar(work) as progress, writable(folder), pool if is_elsewhere else SERIAL as workers:
+            records = Records(folder / RECORDS, is_fresh=is_fresh)
+            task = partial(simulation_of, **asked, progress=idle if is_elsewhere else progress)
+            try:
+                for curve, found, is_known in answered(records, workers, task, case.curves(), **how):
+                    if is_elsewhere or is_known:
+                        progress(simulation_steps(curve), known=is_known)
+                    self.known += is_known
+                    self.simulated.append(SimulatedCurve(curve, *found))
+                    write_simulation(case, self.simulated[-1], folder)
+                    simulated_response_figure(case, self.simulated[-1]).write(folder)
+                    if not is_finished(found):
+                        break
+            except KeyboardInterrupt:
+                if len(self.simulated) in (0, case.planned):  # nothing is found, or all, but not written
+                    raise
+        whole = len(self.simulated) - self.simulated[-1].interrupted
+        if whole < case.planned:
+            place = f"in the simulation of curve {whole + 1} of {case.planned}"
+            self.interruption = f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
+        watch.shown(show(case, self.simulated, results))
+        watch.noted(notes(case, self.simulated, MONTE_CARLO))
+
+
+def simulate_case(
+    case: Case,
+    out: str | Path = "results",
+    *,
+    pool: Pool = SERIAL,
+    is_fresh: bool = False,
+    watch: Watch = SILENT,
+) -> Simulations:
+    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
+
+    Of a system with terms of degree 3 the stationary response is written too. What an earlier simulation wrote there is
+    removed first, and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated
+    and written, and curves that are finished are not simulated again the next time.
+
+    Args:
+        pool: whose other machines simulate, such as a `cluster`; all processors of this one where there are none.
+        is_fresh: whether to simulate all curves again.
+
+    Raises:
+        OutputError: the folder cannot be made or written to, or another run writes into it.
+        FpsolveError: a curve cannot be simulated; nothing is written.
+        KeyboardInterrupt: nothing was done yet, which its text says.
+    """
+    refuse_obstacles(case)
+    simulations, started = Simulations(case), datetime.now(UTC)
+    with (
+        own_folder(case, out, (SIMULATED,)) as folder,
+        saying_if_interrupted(lambda: kept(len(simulations.simulated), of_curves(case), folder)),
+    ):
+        simulations.run(folder, pool, watch, is_fresh=is_fresh)
+        simulated, is_whole = simulations.simulated, not simulations.interruption
+        blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
+        write_report(case, folder, watch, blocks, started=started, files=SIMULATION, complete=is_whole)
+    return simulations
 
 
 def simulate(
@@ -32,8 +153,6 @@ def simulate(
         seed: Seed of the random numbers; 0 if the case does not state it.
         estimator: direct, or population for strong noise or large |p|; chosen if the case does not state it.
     """
-    from fpsolve.show.results import done_of, known_of
-    from fpsolve.workflow.simulate import refuse_obstacles, simulate_case
 
     stated = {"paths": paths, "time": time, "seed": seed, "estimator": estimator}
     typed = {

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import expm
 
 from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.exponent.rightmost import EXACTLY, Rates, Solve
-from fpsolve.superlu import sparse_lu
+from fpsolve.fem.factors import sparse_lu
 
 
 @lru_cache(maxsize=32)

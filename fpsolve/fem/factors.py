@@ -8,17 +8,18 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
+from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csc_matrix, identity, kron
+from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray, IntArray, dense
 from fpsolve.budget import timed
 from fpsolve.errors import SingularMatrix
 from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
-from fpsolve.superlu import sparse_lu
 
 LARGEST_GROWTH = 1e3
 """Largest entry of a P_k over the norm of the matrix, as rows of different levels are not exchanged."""
@@ -65,6 +66,14 @@ def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
             with suppress(SingularMatrix):
                 return LevelFactors(operator, noise)
         return SparseFactors(operator)
+
+
+def sparse_lu(matrix: Any, *, permc_spec: str = "MMD_AT_PLUS_A", **options: Any) -> Any:
+    """SuperLU's factors, ordered for a symmetric pattern if nothing else is named. Raises `SingularMatrix`."""
+    try:
+        return splu(matrix, permc_spec=permc_spec, **options)
+    except RuntimeError as failure:
+        raise SingularMatrix(*failure.args) from failure
 
 
 class ArrayFactors:

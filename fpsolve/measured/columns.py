@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fpsolve.arrays import FloatArray, IntArray
-from fpsolve.reading import Words
+from fpsolve.files import Words
 
 WORDS = Words("the measurement", "a file of numbers", "spectrum.csv", "comma-separated", "export the data again", True)
 _HEADING = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\]]*)\]|\((?P<round>.*)\))\s*")

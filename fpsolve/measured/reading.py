@@ -14,6 +14,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.files import Unreadable
 from fpsolve.measured.columns import Column, Table
 from fpsolve.measured.signals import (
     FREQUENCIES,
@@ -29,7 +30,6 @@ from fpsolve.measured.signals import (
 )
 from fpsolve.measured.spectrum import Record, Spectrum
 from fpsolve.measured.tables import read_table
-from fpsolve.reading import Unreadable
 
 Per = Literal["Hz", "rad/s"]
 Sided = Literal["one", "two"]

@@ -21,10 +21,10 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
+from fpsolve.files import Unreadable, read_bytes
 from fpsolve.measured.columns import WORDS, Column, Table
 from fpsolve.measured.matlab import MatError, read_mat
 from fpsolve.measured.text import MOST_TEXT, NO_TABLE, read_peer_table, read_text_table
-from fpsolve.reading import Unreadable, read_bytes
 
 MOST_NUMBERS = 2**25
 """Of all arrays of a file."""

@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 
 from fpsolve.arrays import IntArray
+from fpsolve.files import Unreadable, read_text
 from fpsolve.measured.columns import WORDS, Column, Table, heading
 from fpsolve.measured.signals import FREQUENCIES, SIGNALS, TIMES, among, density_unit
-from fpsolve.reading import Unreadable, read_text
 
 NO_TABLE = "has no table of numbers"
 MOST_COLUMNS = 1000

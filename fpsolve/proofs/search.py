@@ -19,13 +19,13 @@ import scipy.sparse as sp
 from scipy.special import roots_jacobi
 
 from fpsolve.arrays import FloatArray
+from fpsolve.fem.factors import sparse_lu
 from fpsolve.proofs.balls import above, ball, balls, below, precision
 from fpsolve.proofs.basis import OTHERS, Basis, Core, Whole, hermite_table
 from fpsolve.proofs.bounds import LOWER, UPPER, Bounder, Bounds, FrozenBounds, Trial
 from fpsolve.proofs.certificate import NOTHING, BasisRecord, Certificate, Enclosure, SideRecord, enclosure_of
 from fpsolve.proofs.statement import Cylinder, Statement, cylinder
 from fpsolve.proofs.verify import objection
-from fpsolve.superlu import sparse_lu
 
 SMALLEST, GROWTH, MOST, MOST_UNKNOWNS = (5, 9), 1.35, 399, 25_000
 """Modes on either side and polynomials of the first trial, by what one of both grows, how far each and both."""

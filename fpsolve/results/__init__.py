@@ -1,4 +1,4 @@
-"""What is found for curves, and the numbers of many as one table."""
+"""Numbers become a table and its files."""
 
 import lazy_loader
 

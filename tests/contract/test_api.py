@@ -18,7 +18,7 @@ from fpsolve import CaseError, FpsolveError, NotConverged, load_case, moment_lya
 from fpsolve.exponent import Budget
 from fpsolve.measured import read_spectrum
 from fpsolve.model import ModalSystem
-from fpsolve.workflow import compare, simulate_curve
+from fpsolve.solve import compare, simulate_curve
 from tests.contract.test_cases import CASES
 from tests.kit import ALL, case_in, case_text, run, simulate_curves, solve_case, solve_sets
 
@@ -93,7 +93,7 @@ def test_results_cannot_be_changed(tmp_path):
 
 def test_errors_travel_with_what_they_say_and_speak_of_arguments_or_of_keys(tmp_path):
     problem = load_case(CASES / "minimal.toml").problem
-    with pytest.raises(NotConverged, match="use a larger rtol or a larger budget") as first:
+    with pytest.raises(NotConverged, match=r"use a larger rtol or a larger \[budget\]") as first:
         moment_lyapunov(problem, 60.0, budget=Budget(unknowns=100))
     with pytest.raises(CaseError, match=r"omega: got -1\.0") as second:
         load_case(CASES / "minimal.toml", ["oscillator.omega=-1.0"])
@@ -153,7 +153,7 @@ def test_the_package_is_the_command_and_is_silent_where_all_is_well(tmp_path, ar
 START = """
 from fpsolve import NonGaussianNoise, Problem, VibroImpactOscillator, moment_lyapunov, sensitivities, stability_index
 from fpsolve import tilted_density
-from fpsolve.output import draw_eigenfunction
+from fpsolve.tell import draw_eigenfunction
 oscillator = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 problem = Problem(oscillator, NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95).ou_reduction())
 result = moment_lyapunov(problem, [0.0, 1.0, 2.0])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, load_case, moment_lyapunov
-from fpsolve.workflow import check_case, compare
+from fpsolve.commands import check_case
+from fpsolve.solve import compare
 from tests.conftest import sampled
 from tests.kit import run, solve_case
 from tests.oracles import perturbation

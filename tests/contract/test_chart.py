@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, load_case
-from fpsolve.workflow import Watch, chart_case
+from fpsolve.commands import chart_case
+from fpsolve.tell import Watch
 from tests.kit import case_in, case_text, read_csv, read_json, run
 
 TEXT = """[moments]

@@ -26,7 +26,7 @@ from fpsolve import (
 )
 from fpsolve.fem import write_mesh
 from fpsolve.model import MarkovChain, Telegraph, White
-from fpsolve.parts import write_density, write_eigenfunctions
+from fpsolve.results import write_density, write_eigenfunctions
 from fpsolve.theory import first_order_eigenfunction
 from tests.conftest import sampled
 from tests.kit import TEXT, case_in, files, rates, read_json, run

@@ -19,7 +19,7 @@ from fpsolve import (
 )
 from fpsolve.exponent import critical_impact_factor, critical_restitution
 from fpsolve.model import ParametricOscillator, Telegraph, White
-from fpsolve.output import draw_eigenfunction
+from fpsolve.tell import draw_eigenfunction
 from tests.conftest import sampled
 from tests.kit import TEXT, case_in, files, rates, run
 

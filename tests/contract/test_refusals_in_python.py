@@ -247,7 +247,7 @@ BAD = [
         "got jump = 2; must be 0|got jump = 2; must be a whole number",
     ),
     (on_mesh, "of a filter needs a mesh without z_lines"),
-    (strong, r"more than budget.unknowns = 3000; .* larger budget"),
+    (strong, r"more than budget.unknowns = 3000; .* larger .budget."),
     # Equations
     (lambda: of(variables=()), r"^variables: got "),
     (lambda: of(variables=("x", 3)), "^variables: got "),

@@ -18,7 +18,7 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis, excursion, furstenberg_khasminskii, latin_hypercube, laws_of
 from fpsolve.model import Bounded, CoefficientMatrix, CubicTerms, Jump, MarkovChain, PlaneSystem, Telegraph, White
-from fpsolve.output import draw_eigenfunction
+from fpsolve.tell import draw_eigenfunction
 from tests.kit import itself, rates
 
 NOISE = OrnsteinUhlenbeck(alpha=2.0, sigma=1.5)

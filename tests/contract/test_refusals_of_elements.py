@@ -207,7 +207,7 @@ def test_path_that_is_no_mesh_file_is_refused(tmp_path):
         for ending in (".vtu", ".msh"):
             name = f"bad{len(content)}{ending}"
             (tmp_path / name).write_text(content)
-            named[name] = f"{name} cannot be read as a {ending} mesh .*make one with `write_mesh`"
+            named[name] = f"{name} cannot be read as a {ending} mesh .*make one with `fpsolve mesh`"
     for name, words in named.items():
         with pytest.raises(FpsolveError, match=words):
             read_mesh(tmp_path / name)

@@ -62,7 +62,7 @@ REFUSED = {
         "moment(NEIGHBOURS, budget=Budget(seconds=0.05))": "take some .* more than budget.seconds = 0.05; no mesh",
         "moment(STIFF)": "rounding alone may change it by ((?!budget).)*; use a larger rtol((?!budget).)*$",
         "moment(LARGE, -3.0, rtol=1e-4, budget=Budget(unknowns=200))": (
-            "not found on this mesh: ((?!use more cells).)*; use a larger rtol or a larger budget$"
+            "not found on this mesh: ((?!use more cells).)*; use a larger rtol or a larger .budget.$"
         ),
         "impact_rate(UNRESOLVED)": "budget",
         "critical_impact_factor(UNRESOLVED)": "budget",

@@ -13,7 +13,7 @@ from scipy.stats import norm
 import fpsolve
 from fpsolve import NonGaussianNoise, load_case, moment_lyapunov, simulate
 from fpsolve.analysis import latin_hypercube
-from fpsolve.workflow import compare
+from fpsolve.solve import compare
 from tests.kit import case_in, case_text, files, read_csv, read_json, run, solve_case
 from tests.oracles import clocked, filtered, fourier_hermite, kronecker, perturbation
 from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent

@@ -12,7 +12,8 @@ import pytest
 import pyvista
 
 from fpsolve import load_case, lyapunov_exponent
-from fpsolve.workflow import Watch, run_case, simulate_case
+from fpsolve.commands import run_case, simulate_case
+from fpsolve.tell import Watch
 from tests.conftest import started
 from tests.kit import case_in, case_text, read_csv, read_json, run
 

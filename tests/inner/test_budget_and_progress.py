@@ -12,8 +12,8 @@ from fpsolve import ExponentSolver, NotConverged, Problem
 from fpsolve.budget import Meter, begin, charge, timed, watched
 from fpsolve.exponent import Budget, critical_restitution, impact_rate, solve_moments
 from fpsolve.exponent.root import nonzero_root
-from fpsolve.workflow import Phase
-from fpsolve.workflow.progress import MOMENTS, SETS, Bars
+from fpsolve.tell import Phase
+from fpsolve.tell.progress import MOMENTS, SETS, Bars
 from tests.conftest import FIG1, FIG1_NOISE, sampled
 
 
@@ -56,7 +56,7 @@ def test_budget_ends_a_number_and_never_changes_it(name, processor):
     spent = processor.now - begin
     assert NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=spent))) == value
     with pytest.raises(
-        NotConverged, match=r"take some .* s of processor time together, more than budget\.seconds = .*budget$"
+        NotConverged, match=r"take some .* s of processor time together, more than budget\.seconds = .*budget.$"
     ):
         NUMBERS[name](ExponentSolver(problem, budget=Budget(seconds=0.1 * spent)))
 

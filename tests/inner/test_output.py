@@ -8,9 +8,9 @@ import pytest
 
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.output.figures import Encoding, main_figure
-from fpsolve.results.curve import CurveResult, MomentColumns
-from fpsolve.study.columns import table_of
+from fpsolve.results.columns import table_of
+from fpsolve.solve.curve import CurveResult, MomentColumns
+from fpsolve.tell.figures import Encoding, main_figure
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.kit import TEXT, case_in

@@ -8,8 +8,8 @@ import pytest
 from fpsolve.data import plain_unit
 from fpsolve.drawing import plain_numbers, typeset
 from fpsolve.exponent.error import digits
-from fpsolve.results.text import sampled, sign_of
-from fpsolve.show.numbers import bounds_text
+from fpsolve.tell.numbers import bounds_text
+from fpsolve.tell.text import sampled, sign_of
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,14 @@ import pytest
 from fpsolve import NotConverged, tilted_density
 from fpsolve.exponent.density import UNRESOLVED
 from fpsolve.model.quantity import MOMENT, P
-from fpsolve.output.figures import Series, draw_series
+from fpsolve.tell.figures import Series, draw_series
 from fpsolve.theory.perturbation import second_order
 from tests.inner.test_output import drawn, many  # noqa: F401
 from tests.inner.test_workflow import raising
 from tests.kit import LEAN, TEXT, case_in, files, run, solve_sets
 
 
-@pytest.mark.parametrize("place", ["fpsolve.show.problem.noise_sentences", "fpsolve.workflow.reports.page_of"])
+@pytest.mark.parametrize("place", ["fpsolve.tell.problem.noise_sentences", "fpsolve.tell.reports.page_of"])
 def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, place):
     monkeypatch.setattr(place, raising(RuntimeError("a fault")))
     done = run(tmp_path, "run", "case.toml", "--report", "--set", LEAN, case=TEXT)

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from fpsolve import ExponentSolver, load_case
+from fpsolve.commands import run_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import message_of
-from fpsolve.output.records import made, packed, plain, unpacked
-from fpsolve.parts import QUESTIONS, indices
+from fpsolve.results import columns
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
-from fpsolve.study import columns, solve
-from fpsolve.workflow import run_case, simulate
+from fpsolve.solve import QUESTIONS, indices, simulate
+from fpsolve.solve import sets as solve
+from fpsolve.solve.records import made, packed, plain, unpacked
 from tests.contract.test_cases import CASES, ROOT
 from tests.contract.test_docs import typed
 from tests.kit import case_in, case_text, from_record, solve_sets
@@ -105,7 +106,7 @@ def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatc
             raise NotConverged("the simulation overflowed")
         return original(curve, **asked)
 
-    monkeypatch.setattr(simulate, "simulation_of", failing)
+    monkeypatch.setattr("fpsolve.commands.simulate.simulation_of", failing)
     text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"
     case = case_in(tmp_path, case_text(f'{text}[vary]\n"noise.D0" = [0.1, 0.2]', epsilon=0.5))
     with pytest.raises(NotConverged, match="the simulation overflowed"):

@@ -72,7 +72,7 @@ def test_command_compares_with_the_moments_and_tells_what_differs(tmp_path, monk
         refused = run(tmp_path, "check", "--hierarchy", "case.toml", "--set", override)
         assert refused.code == 2
         assert words in " ".join(refused.err.split())
-    monkeypatch.setattr("fpsolve.workflow.check.even_moment", lambda *_: SimpleNamespace(value=0.1, error=1e-12))
+    monkeypatch.setattr("fpsolve.solve.check.even_moment", lambda *_: SimpleNamespace(value=0.1, error=1e-12))
     failed = run(tmp_path, "check", "--hierarchy", "case.toml", "--jobs", "1", "--quiet")
     assert (failed.code != 0, failed.out) == (True, "case: 0 of 4 ok\n")
 

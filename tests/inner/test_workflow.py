@@ -9,13 +9,13 @@ import pytest
 
 from fpsolve import FpsolveError
 from fpsolve.case.sections import MonteCarloSection
+from fpsolve.commands import run_case
 from fpsolve.exponent.method import Budget
 from fpsolve.files import alone, atomic
-from fpsolve.output.known import ROW, names_of
-from fpsolve.parts.question import Numerics
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.workflow import run_case
-from fpsolve.workflow.simulate import simulation_key
+from fpsolve.results.known import ROW, names_of
+from fpsolve.solve.question import Numerics
+from fpsolve.solve.simulate import simulation_key
 from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
 
 ASKED = {
@@ -71,21 +71,21 @@ def raising(failure):
 @pytest.mark.parametrize(
     ("place", "command", "message"),
     [
-        ("fpsolve.workflow.cases.Sweep", "run", "interrupted before the first curve; run it again to go on"),
-        ("fpsolve.study.solve.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
-        ("fpsolve.study.solve.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
+        ("fpsolve.commands.cases.Sweep", "run", "interrupted before the first curve; run it again to go on"),
+        ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
+        ("fpsolve.solve.sets.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
         (
-            "fpsolve.workflow.sets.write_curves",
+            "fpsolve.commands.sweep.write_curves",
             "run",
             "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
         ),
         (
-            "fpsolve.page.terminal.print_blocks",
+            "fpsolve.tell.terminal.print_blocks",
             "run",
             "interrupted; what was solved is kept in results/case; run it again to go on",
         ),
         (
-            "fpsolve.show.results.write_figures",
+            "fpsolve.tell.solved.write_figures",
             "run",
             "interrupted; what was solved is kept in results/case; run it again to go on",
         ),
@@ -149,7 +149,7 @@ def test_pictures_come_back_from_machines_that_share_no_folder(tmp_path):
     ],
 )
 def test_a_failure_to_write_is_one_sentence(tmp_path, monkeypatch, failure, said):
-    monkeypatch.setattr("fpsolve.study.solve.solve_curve", raising(failure))
+    monkeypatch.setattr("fpsolve.solve.sets.solve_curve", raising(failure))
     done = run(tmp_path, "check", "case.toml", case=TEXT)
     assert (done.code, done.err.count("\n"), done.err.startswith(said)) == (2, 1, True)
 
@@ -179,7 +179,7 @@ def test_many_curves_leave_their_numbers_to_results_nc(tmp_path, monkeypatch):
     place = tmp_path / "results/case/summary.json"
     assert run(tmp_path, *asked, case=TEXT).code == 0
     few = read_json(place)
-    monkeypatch.setattr("fpsolve.output.tables.MOST_SUMMARISED", 1)
+    monkeypatch.setattr("fpsolve.results.tables.MOST_SUMMARISED", 1)
     assert run(tmp_path, *asked).code == 0
     many = read_json(place)
     assert many["curves"] == [

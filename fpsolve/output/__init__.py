@@ -1,5 +1,0 @@
-"""Results become tables, records and figures."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,1 +1,0 @@
-from .eigenfunctions import draw_eigenfunction as draw_eigenfunction

@@ -1,0 +1,53 @@
+"""The files of a design: design.json, design.toml."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from fpsolve.case.case import Case
+from fpsolve.case.rewrite import rewritten
+from fpsolve.files import write_json, write_text
+from fpsolve.results.tables import head
+from fpsolve.solve.design import DesignOutcome
+
+
+def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Mapping[str, Any]) -> None:
+    """design.json, and where there is a design, design.toml: the case with its values."""
+    write_json(folder / "design.json", summary(case, outcome, facts))
+    found = outcome.found
+    if found is not None:
+        values = {key: each.value for key, each in found.values.items()}
+        expected = outcome.expectation(case)
+        more = f"\n{tomlkit.dumps({'expect': [expected]})}" if expected else ""
+        write_text(folder / "design.toml", rewritten(case, folder, values, without=["expect"], more=more))
+
+
+def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dict[str, Any]:
+    """What became of a design."""
+    found, target, before = outcome.found, outcome.target, case.problem.values
+    changed = found.values if found else {}
+    return {
+        **head(case),
+        "complete": found is not None,
+        "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
+        "by": [
+            {
+                **{name: getattr(axis, name) for name in ("key", "start", "stop", "scale")},
+                "unit": outcome.units[axis.key],
+                "before": before[axis.key],
+                "after": changed[axis.key].value if found else None,
+                "error_estimate": changed[axis.key].error_estimate if found else None,
+            }
+            for axis in outcome.by
+        ],
+        "found": found and {"value": found.found.value, "error_estimate": found.found.error_estimate},
+        "distance": found and found.distance,
+        "solves": found and found.solves,
+        "parameters": dict(before),
+        "message": outcome.reason and outcome.reason,
+        **facts,
+    }

@@ -1,0 +1,120 @@
+"""The files of densities of directions: densities.nc, and a series for ParaView."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Curve
+from fpsolve.data import Quantity, dataset
+from fpsolve.exponent.density import Densities, DirectionGrid
+from fpsolve.files import atomic
+from fpsolve.model.quantity import MOMENT, P
+from fpsolve.results.nodes import FIELDS
+from fpsolve.results.vtk import Facts, field_data, write_between, write_series
+
+ERROR = Quantity(
+    "density_error",
+    "error",
+    "estimated error of the densities",
+    dims=("p",),
+    comment="total variation, from coarser ones",
+)
+_DIGITS = str.maketrans("₁₂₃₄²", "12342")
+"""Digits in ASCII."""
+STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
+
+
+def on_one_grid(found: Sequence[Densities]) -> list[Densities]:
+    """All on the finest of their grids."""
+    grid = max((each.grid for each in found), key=lambda grid: grid.first.size)
+    return [each.on(grid) for each in found]
+
+
+def directions_file(curve: Curve, folder: Path) -> Path:
+    """Where the densities of a curve are."""
+    return folder / f"densities{curve.suffix}.nc"
+
+
+def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
+    """Write densities.nc: of every p that is there the fields over directions, and that at p = 0 as the stationary one.
+
+    Args:
+        found: on one grid; none is written without one.
+        curve: whose they are.
+        folder: where.
+    """
+    shown = [each for each in found if each.pair.p or len(found) == 1]
+    grid = found[0].grid
+    plane = tuple(each.name for each in grid.quantities)
+    numbers = dict[Quantity, Any]()
+    for each in found:
+        if not each.pair.p:
+            numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.T_adjoint
+            numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
+    for name, quantity in FIELDS.items():
+        about = replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)
+        numbers[about] = np.stack([getattr(each.fields, name) for each in shown])
+    numbers[ERROR] = np.array([each.error for each in shown])
+    numbers[MOMENT] = np.array([each.value for each in shown])
+    for mean in grid.means(shown[0].fields.tilted_density):
+        values = [grid.means(each.fields.tilted_density)[mean] for each in shown]
+        numbers[replace(mean, dims=("p",))] = np.array(values)
+    places = {P: np.array([each.pair.p for each in shown]), **grid.coordinates}
+    if grid.share:
+        places[grid.share] = np.sin(grid.first) ** 2
+    content = io.BytesIO()  # HDF5 does not survive a full disk
+    whole = dataset("densities of directions", "finite elements", numbers, places, curve.parameters)
+    whole.to_netcdf(content, engine="h5netcdf")
+    with atomic(directions_file(curve, folder)) as draft:
+        draft.write_bytes(content.getvalue())
+
+
+def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
+    """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first curve the stationary density.
+
+    The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, with a stop y = θ₁ between two impacts, so that
+    T jumps from one edge to the other, and of three variables the unit sphere. At p = 0
+    T = 1 and T* is the stationary density, so that the series leaves it out.
+    """
+    found = on_one_grid(found)
+    write_densities(found, curve, folder)
+    grid, problem = found[0].grid, curve.problem
+    facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
+    facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    stationary, others = [each for each in found if not each.pair.p], [each for each in found if each.pair.p]
+    first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
+    always = dict[str, FloatArray]()
+    for each in stationary:
+        always["stationary_density"] = each.fields.T_adjoint
+    always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
+    if stationary and curve.number == 1:
+        _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
+
+    def write(path: Path, each: Densities) -> None:
+        data = dict(reversed(each.fields._asdict().items()))
+        _write_plane(path, grid, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
+
+    if others:
+        write_series(
+            folder, f"eigenfunctions{curve.suffix}", {each.pair.p: partial(write, each=each) for each in others}
+        )
+
+
+def _plain(axis: Quantity) -> str:
+    """The words of a coordinate and its unit, in ASCII."""
+    return f"{axis.words} ({axis.unit})".translate(_DIGITS).encode("ascii", "replace").decode()
+
+
+def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray], facts: Facts) -> None:
+    """Write a .vtu file of quadrilaterals between the nodes; the first array of point data is shown first."""
+    first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
+    places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
+    write_between(path, places, data, facts)

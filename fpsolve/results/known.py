@@ -1,0 +1,168 @@
+"""What is known of the curves of a case: their records become results, and their work becomes records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from types import GenericAlias
+from typing import Any
+
+import numpy as np
+
+from fpsolve.case.case import Case, Curve
+from fpsolve.model.quantity import STATUS
+from fpsolve.results.beyond import says_more
+from fpsolve.results.columns import row_of, table_of
+from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.discretisation import QUESTION as DISCRETISATION
+from fpsolve.solve.discretisation import largest_of
+from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.question import Asked, Entry, Job, Limit, Numerics, Reason
+from fpsolve.solve.questions import BY_NAME
+from fpsolve.solve.records import Entries, Records, key_of, made, plain
+from fpsolve.solve.sets import everything, result_of
+
+KEPT = 100
+"""So many results stay in memory, as of few curves all are asked for again."""
+ROW = "row"
+"""What the entries of Λ(p) are called, before their p."""
+_LARGEST = tuple[float, dict[str, Any]]
+"""The form of the p of the largest size in a record, and of what it was solved on."""
+_ROW = tuple[tuple[float, ...], Limit | None]
+"""The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
+
+
+def form_of(name: str) -> Any:
+    """The form of an `Entry` of a question in a record."""
+    return GenericAlias(tuple, (BY_NAME[name].kind | None, Reason | None, float, Limit | None))
+
+
+def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
+    """What the entries of a set are called in its records: by a digest of all that their numbers follow from.
+
+    A budget is none of this: a number is the same under any.
+    """
+    solver = numerics.rtol, numerics.mesh and vars(numerics.mesh)
+    of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
+    names = {name: key_of(each, *solver) for name, each in asked.items()}
+    return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
+
+
+def record_of(job: Job) -> Entries:
+    """The entries of what was solved now of a set, and of each p."""
+    names = names_of(job.asked, job.numerics)
+    record = Entries()
+    for name, each in job.new.items():
+        record[names[name]] = plain(form_of(name), (each.found, each.reason, each.seconds, each.limit))
+    if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
+        limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
+        known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
+        record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
+    if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
+        record[f"{names[MOMENTS.name]} largest"] = plain(_LARGEST, largest)
+    return record
+
+
+def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bool = False) -> Job:
+    """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
+    for name in job.asked:
+        with suppress(ValueError, KeyError, TypeError):
+            entry = Entry(*made(form_of(name), record[names[name]]))
+            if is_all or job.numerics.settles(entry.limit):
+                job.entries[name] = entry
+    with suppress(ValueError, KeyError):
+        job.largest = made(_LARGEST, record[f"{names[MOMENTS.name]} largest"])
+    for p in job.asked[MOMENTS.name]["p"]:
+        with suppress(ValueError, KeyError, TypeError):
+            row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])
+            if is_all or job.numerics.settles(limit):
+                job.rows[p] = row
+    return job
+
+
+class Results(Sequence[CurveResult]):
+    """What is known of the curves of a case, in their order; each is made of its records when it is looked at.
+
+    Args:
+        case: whose curves these are.
+        records: those of its folder.
+
+    Attributes:
+        asked: what is asked of the first curve, and of each other one.
+        table: the numbers of all that are known.
+        says: whether anything is said of a curve beyond its numbers, shape (curves,).
+        whole: the numbers of the curves of which all is known that is asked for.
+    """
+
+    def __init__(self, case: Case, records: Records) -> None:
+        self._case, self._records, self._numerics = case, records, Numerics.of(case)
+        self.asked = everything(case, 1), everything(case, 2)
+        self._names = [names_of(each, self._numerics) for each in self.asked]
+        self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
+        self.whole = set[int]()
+        self._kept: dict[int, CurveResult] = {}
+        for job in self._jobs():
+            if job.is_whole:
+                self.add(job)
+
+    def job(self, number: int, *, is_all: bool = False) -> Job:
+        """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
+        vary, place = self._case.vary, number > 1
+        curve = Curve(self._case.problem, vary.sets[number - 1], number)
+        job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
+        return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
+
+    def add(self, job: Job) -> CurveResult:
+        """Take what is known of a curve into the table."""
+        number, result = job.curve.number, result_of(job)
+        if job.is_whole:
+            self.whole.add(number)
+        if number <= KEPT:
+            self._kept[number] = result
+        self.table.put(number - 1, row_of(self._case, result))
+        self.says[number - 1] = says_more(self._case, result)
+        return result
+
+    def put(self, curve: Curve, record: Entries) -> CurveResult:
+        """Keep what was solved of a curve."""
+        self._records.put(curve.digest, record)
+        return self.add(self.job(curve.number, is_all=True))
+
+    def add_rest(self) -> None:
+        """Take in what is known of the sets that are not finished."""
+        for job in self._jobs(is_all=True):
+            if job.entries or job.rows:
+                self.add(job)
+
+    def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
+        left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
+        return (self.job(number, is_all=is_all) for number in sorted(left))
+
+    @property
+    def telling(self) -> Iterator[CurveResult]:
+        """Those of which more is said than their numbers."""
+        return (self.of(number) for number in self.numbers if self.says[number - 1])
+
+    def of(self, number: int) -> CurveResult:
+        """That of the curve with a number."""
+        return self._kept.get(number) or result_of(self.job(number, is_all=True))
+
+    @property
+    def places(self) -> list[int]:
+        """Those in the table of the curves of which anything is known."""
+        return np.flatnonzero(np.isfinite(self.table[STATUS.name].values)).tolist()
+
+    @property
+    def numbers(self) -> list[int]:
+        """Those of the curves of which anything is known."""
+        return [place + 1 for place in self.places]
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __iter__(self) -> Iterator[CurveResult]:
+        return map(self.of, self.numbers)
+
+    def __getitem__(self, index: Any) -> Any:
+        numbers = self.numbers[index]
+        return [*map(self.of, numbers)] if isinstance(numbers, list) else self.of(numbers)

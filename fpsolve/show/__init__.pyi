@@ -1,1 +1,0 @@
-from .curves import curve_grid as curve_grid

@@ -1,0 +1,212 @@
+"""Charts: the lines on which stability ends in a plane of two parameters, each point of which is solved once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fpsolve.analysis.axis import Axis
+from fpsolve.analysis.regions import P_BIFURCATIONS, Regions, regions
+from fpsolve.analysis.scan import Sample, Scan, scan_row
+from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
+from fpsolve.analysis.target import Target
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.sections import ChartSection
+from fpsolve.errors import FpsolveError, NoPerturbationTheory
+from fpsolve.exponent.kinds import choose
+from fpsolve.messages import Code, Message, message_of
+from fpsolve.model.problem import Problem
+from fpsolve.pool import Pool
+from fpsolve.solve.records import Records, answered, key_of, made, plain
+from fpsolve.theory.perturbation import second_order
+
+LINE_RECORDS = "records/charted.jsonl"
+"""The file of the records of points of lines."""
+POINT = Sample | Message
+"""What is recorded of a point: F, or why there is none."""
+CLOSED_FORM_NODES = 41
+"""Of the grid, each way, on which the closed forms are evaluated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """What a case says of stability in a plane of two parameters.
+
+    Attributes:
+        lines: one for each entry of `lines` that is begun, in their order.
+        closed_forms: for each of them the branches of its closed form, Eqs. (38)-(39), each of shape (n, 2), in the
+            parameters themselves.
+        regions: once all lines are traced.
+        complete: whether they are, none stopped by the budget.
+    """
+
+    lines: tuple[Boundary, ...]
+    closed_forms: tuple[tuple[FloatArray, ...], ...]
+    regions: Regions | None = None
+    complete: bool = False
+
+    @property
+    def fails(self) -> bool:
+        """Whether a line ends too early, or nothing was found: F of no line exists anywhere in the frame."""
+        return bool(self.failures) or not any(np.isfinite(line.scan.values).any() for line in self.lines)
+
+    @property
+    def failures(self) -> tuple[Message, ...]:
+        """Why lines end inside of the frame, or may lack branches."""
+        obstacles = [text for line in self.lines for trace in line.traces for text in trace.obstacles]
+        return (*obstacles, *(text for line in self.lines for text in line.obstacles))
+
+    @property
+    def remarks(self) -> tuple[Message, ...]:
+        """What has no line, which lines end inside of the frame, and where no F exists, with the reasons."""
+        found = [line.remark() for line in self.lines if line.complete or line.obstacles]
+        for line in self.lines:
+            reasons = (text for trace in line.traces for text in trace.obstacles)
+            ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
+            holes = [each for each in line.scan.reasons if each not in line.obstacles]
+            found += [Message(Code.LINE_ENDS, line=line.target.equation, reason=each) for each in ends]
+            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes]
+        return tuple(message_of(each) for each in found if each)
+
+
+def charted(case: Case) -> ChartSection:
+    """The frame of a case and the lines in it. Raises `FpsolveError` where it has none."""
+    if case.chart is not None:
+        return case.chart
+    raise FpsolveError(
+        f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
+        'stop = 5.0 }, y like it, and lines = ["moment(2) = 0"]'
+    )
+
+
+def refuse_no_chart(case: Case) -> None:
+    """Refuse a case without a chart, or that varies another key than its two. Raises `FpsolveError`."""
+    frame = charted(case)
+    if set(case.vary.keys) - {frame.x.key, frame.y.key}:
+        raise FpsolveError(
+            f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
+        )
+
+
+def dear_lines(case: Case) -> Message | None:
+    """What the lines of a chart cost whose points take seconds; None where there are none."""
+    if not (dear := [line for line in begun_lines(case) if choose(line.problem).is_dear(line.target.order)]):
+        return None
+    nodes, few = sum(line.nodes**2 for line in dear), round(1 / dear[0].step)
+    equations = [line.target.equation for line in dear]
+    return Message(Code.DEAR_CHART, lines=equations, nodes=nodes, few=few, many=3 * few)
+
+
+def begun_lines(case: Case) -> list[Boundary]:
+    """The lines of a chart, of which nothing is traced."""
+    frame, problem = charted(case), case.problem
+    own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
+    return [untraced(target, frame.x, frame.y, problem, **own) for target in frame.lines]
+
+
+def solve_chart(
+    case: Case,
+    lines: Sequence[Boundary],
+    rows: Iterator[Scan],
+    *,
+    progress: Callable[[], None] = lambda: None,
+    stepped: Callable[[], None] = lambda: None,
+    has_closed_forms: bool = True,
+) -> Iterator[Chart]:
+    """What there is so far, after each scan, branch and line, and in the end the whole chart.
+
+    Args:
+        case: with a chart, see `refuse_no_chart`.
+        lines: see `begun_lines`.
+        rows: what `scan_row` gives for the `rows` of all lines, in order.
+        progress: called once for each node of each scan.
+        stepped: called once for each point that is traced.
+        has_closed_forms: whether they are found, too, which takes seconds.
+    """
+    axes = lines[0].x, lines[0].y
+    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, axes) if has_closed_forms else ())
+    for each in lines:
+        done = chart.lines
+        for line in each.solve(rows, progress, stepped):
+            chart = replace(chart, lines=(*done, line))
+            yield chart
+    whole = tuple(crossed(chart.lines))
+    yield Chart(whole, chart.closed_forms, regions(whole), complete=all(line.complete for line in whole))
+
+
+def _closed_forms(
+    problem: Problem, targets: Sequence[Target], axes: tuple[Axis, Axis]
+) -> tuple[tuple[FloatArray, ...], ...]:
+    """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
+    from contourpy import contour_generator
+
+    shares = np.linspace(0, 1, CLOSED_FORM_NODES)
+    x, y = axes
+    linear, quadratic = np.full((2, shares.size, shares.size), np.nan)
+    for i, u in enumerate(shares):
+        for j, v in enumerate(shares):
+            try:
+                here = problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))})
+                theory = second_order(here)
+            except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
+                continue
+            linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
+    found = []
+    for target in targets:
+        ratio = linear + target.order * quadratic
+        values = np.ma.masked_invalid((target.p or 1.0) * ratio - target.level)
+        lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
+        found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
+    return tuple(found)
+
+
+def key_of_line(case: Case, line: Boundary) -> str:
+    """What the records of the points of a line are found by."""
+    axes = (replace(axis, at=()) for axis in (line.x, line.y))
+    return key_of(case.curve({}).digest, [repr(each) for each in (line.target, *axes, line.budget, line.rtol)])
+
+
+def recalled(records: Records, key: str, line: Boundary) -> Boundary:
+    """The line, of which each point is solved once for all runs."""
+    known = dict[str, Sample | Message]()
+    for name, each in records.get(key).items():
+        with suppress(ValueError):  # which counts as none
+            known[name] = made(POINT, each)
+
+    def recall(at: FloatArray, solve: Solve) -> Sample | Message:
+        name = str(at.tolist())
+        if name not in known:
+            known[name] = found = solve(at)
+            if not (isinstance(found, Message) and may_pass(found)):
+                records.put(key, {name: plain(POINT, found)})
+        return known[name]
+
+    return replace(line, recall=recall)
+
+
+def may_pass(reason: Message) -> bool:
+    """Whether a reason may be gone the next time, so that it is not recorded."""
+    return reason.tells_of(Code.NO_MEMORY) or reason.tells_of(Code.SECONDS_SPENT) or is_of_line(reason)
+
+
+def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iterator[Scan]:
+    """The rows of the scans of all lines, by the keys of these, in their order."""
+    rows = {
+        row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
+    }
+
+    def keeps(scan: Scan) -> bool:
+        return not any(map(may_pass, scan.reasons))
+
+    found = answered(records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__, keeps=keeps)
+    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in found)
+
+
+def appears(target: Target) -> str | None:
+    """Which bifurcation a value of δ_p is, if one."""
+    return P_BIFURCATIONS.get(target.value) if target.kind == "stability_index" else None

@@ -1,0 +1,124 @@
+"""What a case expects, or the moment hierarchy says, beside what is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fpsolve.analysis.target import said
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.sections import RESPONSE, Expectation, Varied
+from fpsolve.errors import FpsolveError, NoHierarchy
+from fpsolve.exponent.moments import even_moment, refuse_open_hierarchy
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.messages import Message
+from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.question import Asked, Job, Settings
+from fpsolve.solve.sets import result_of, solve_set
+
+SOURCE = "moment hierarchy; ± the stated error"
+"""The source of values by the hierarchy."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One expectation of a case and what was computed; `met` says whether they agree."""
+
+    expectation: Expectation
+    varied: Varied
+    value: float | None
+    tolerance: float
+    met: bool
+
+    @classmethod
+    def of(cls, wanted: Expectation, result: CurveResult) -> Comparison:
+        """An expectation beside a curve."""
+        if wanted.p is not None:
+            at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
+            value = float(result.moments.value[at[0]]) if at.size else None
+        else:
+            numbers = result.response.numbers if result.response else {}
+            estimate = numbers.get(wanted.of_response) if wanted.of_response else result.estimates[wanted.quantity]
+            value = None if estimate is None else estimate.value
+        tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
+        met = value is not None and abs(value - wanted.value) <= tolerance
+        return cls(wanted, dict(result.curve.varied), value, tolerance, met)
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What a check found.
+
+    Attributes:
+        results: the curves, with what was compared alone; what did not converge is in their `failures`.
+        comparisons: what was expected beside what was computed.
+    """
+
+    results: Sequence[CurveResult]
+    comparisons: Sequence[Comparison]
+
+    @property
+    def failures(self) -> tuple[Message, ...]:
+        """Why some p or indices of some curves are missing."""
+        return tuple(failure.reason for result in self.results for failure in result.failures)
+
+
+def expected(case: Case, varied: Varied) -> Asked:
+    """What the expectations of a case compare, of the curve with these values."""
+    chosen = [each for each in case.expect if each.selects(varied)]
+    p = np.unique([each.p for each in chosen if each.p is not None])
+    asked: dict[str, Settings] = {MOMENTS.name: {"p": p.tolist(), "slopes": False}}
+    asked |= {name: {} for name in INDICES if any(each.quantity == name for each in chosen)}
+    if any(each.of_response for each in chosen):
+        asked[RESPONSE] = {"rtol": case.response.rtol, "grid": None}
+    return asked
+
+
+def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
+    """Every expectation of a case against every curve that it selects."""
+    pairs = ((wanted, result) for wanted in case.expect for result in results)
+    return [Comparison.of(*pair) for pair in pairs if pair[0].selects(pair[1].curve.varied)]
+
+
+def even_moments(case: Case) -> FloatArray:
+    """The even p > 0 of a case, shape (n,)."""
+    return case.p[(case.p > 0) & (case.p % 2 == 0)]
+
+
+def refuse_no_hierarchy(case: Case) -> None:
+    """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
+    orders = even_moments(case)
+    if case.method.by_moments:
+        raise FpsolveError(
+            f"{case.path}: has more than two variables, of which Λ(p) of even p is by the hierarchy anyway"
+        )
+    if not orders.size:
+        raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, and the hierarchy is for these; add 2.0")
+    for curve in case.curves():
+        try:
+            refuse_open_hierarchy(curve.problem, float(orders.max()))
+        except (NoHierarchy, ValueError) as failure:
+            place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
+            raise FpsolveError(f"{place}: {said(failure)}") from None
+
+
+def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
+    """Λ of the even p of every curve beside the hierarchy; they agree within the stated error and rounding."""
+    found = []
+    for result in results:
+        errors = dict(zip(result.moments.p.tolist(), result.moments.error_estimate.tolist(), strict=True))
+        for p in even_moments(case).tolist():
+            known = even_moment(result.curve.problem, p)
+            error = errors.get(p, 0.0) + known.error
+            wanted = Expectation(quantity="moment", p=p, value=known.value, atol=error, source=SOURCE)
+            found.append(Comparison.of(wanted, result))
+    return found
+
+
+def compared(job: Job) -> CurveResult:
+    """The task: solves a set, of which the result is small enough to send."""
+    return result_of(solve_set(job))

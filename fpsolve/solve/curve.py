@@ -1,0 +1,265 @@
+"""What is found for the curves of a case: plain values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.analysis.excursions import Excursion
+from fpsolve.analysis.sensitivity import Sensitivities
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Curve
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
+from fpsolve.data import Quantity, Result, dataset
+from fpsolve.exponent.error import Estimate, Failure, InvariantClass
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
+from fpsolve.nonlinear.rest import NearRest
+
+if TYPE_CHECKING:
+    import xarray
+
+    from fpsolve.simulation.estimators import MonteCarlo
+    from fpsolve.simulation.response import Response
+
+
+class Status(IntEnum):
+    """What became of a parameter set; after a case with one that fails the exit code is 3."""
+
+    CONVERGED = 0
+    PARTLY = 1
+    FAILED = 2
+    MISSING = 3
+    BEYOND_RTOL = 4
+    NO_INDEX = 5
+
+    @property
+    def word(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+    @property
+    def fails(self) -> bool:
+        return self in (Status.PARTLY, Status.FAILED)
+
+
+@dataclass(frozen=True, eq=False)
+class MomentColumns:
+    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
+
+    Attributes:
+        p: the moments.
+        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
+        perturbation: Eq. (37) at the same p.
+    """
+
+    p: FloatArray
+    value: FloatArray
+    derivative: FloatArray
+    error_estimate: FloatArray
+    derivative_error: FloatArray
+    residual: FloatArray
+    perturbation: FloatArray
+
+    @property
+    def rate_function(self) -> FloatArray:
+        """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
+        return np.asarray(self.p * self.derivative - self.value) + 0.0
+
+
+NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
+"""Λ(p) at no p."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseDensity:
+    """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
+
+    Attributes:
+        amplitude, phi, xi: the places, shapes (n,), (m,) and (k,).
+        of_amplitude: ρ(a), shape (n,).
+        of_plane: that of both variables at x₁ = a cos φ, x₂ = −s a sin φ, see `LinearMotion.aspect`, shape (n, m).
+        whole: ρ(a, φ, ξ), shape (n, m, k), to the seven digits of a number of four bytes, which are what records and
+            files hold of it.
+    """
+
+    amplitude: FloatArray
+    phi: FloatArray
+    xi: FloatArray
+    of_amplitude: FloatArray
+    of_plane: FloatArray
+    whole: FloatArray
+
+    def plane(self, has_wall: bool) -> tuple[FloatArray, FloatArray]:
+        """φ and the density of both variables over the half-turn; without a wall over a turn, its halves alike."""
+        if has_wall:
+            return self.phi, self.of_plane
+        beyond = self.phi[1:] + math.pi
+        return np.concatenate([self.phi, beyond]), np.concatenate([self.of_plane, self.of_plane[:, 1:]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class CurveResponse(NearRest):
+    """The stationary response of one parameter set.
+
+    Attributes:
+        means: by their names in files.
+        impact_rate: impacts in unit time; None without a wall.
+        balance: what noise feeds into ln a less what impacts take, in unit time; 0 but for its error. This and the next
+            three are None where the moments were solved alone.
+        stability_index: δ_p of the linear system.
+        least: the least density over the largest, negative where it is not resolved.
+        unknowns: of the largest system solved.
+        density: on a grid; None where it is not wanted.
+    """
+
+    means: Mapping[str, Estimate]
+    impact_rate: Estimate | None = None
+    balance: Estimate | None = None
+    stability_index: float | None = None
+    least: float | None = None
+    unknowns: int | None = None
+    density: ResponseDensity | None = None
+
+    @property
+    def numbers(self) -> dict[str, Estimate]:
+        """The means and the impact rate, if there is one, by their names."""
+        return {**self.means, **({} if self.impact_rate is None else {"impact_rate": self.impact_rate})}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CurveResult(Result):
+    """What was computed for one parameter set: numbers and messages, which a record can hold.
+
+    Attributes:
+        curve: the parameters, the oscillator and the noise.
+        moments: Λ(p); where some p failed, of the others.
+        estimates: of each of the `INDICES`, by its name; None where there is none, it was not asked for, or it did not
+            converge.
+        discretisation: what was used for the p of the largest size; None where no p was solved.
+        warnings: what limits these numbers.
+        notes: where the theories compared with are not valid.
+        failures: why some p are missing, or with all p some indices.
+        classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
+        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
+        seconds: how long the processor took.
+    """
+
+    curve: Curve
+    moments: MomentColumns
+    estimates: Mapping[str, Estimate | None]
+    discretisation: dict[str, Any] | None = None
+    warnings: tuple[Message, ...] = ()
+    notes: tuple[Message, ...] = ()
+    failures: tuple[Failure, ...] = ()
+    classes: tuple[InvariantClass, ...] = ()
+    parts: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def excursion(self) -> Excursion | None:
+        """The probability that ‖x‖ ever exceeds a level."""
+        return self.parts.get(EXCURSIONS)
+
+    @property
+    def response(self) -> CurveResponse | None:
+        """The stationary response of a system with terms of degree 3."""
+        return self.parts.get(RESPONSE)
+
+    @property
+    def sensitivities(self) -> Sensitivities | None:
+        """The derivatives of these numbers by the parameters."""
+        return self.parts.get(SENSITIVITIES)
+
+    @property
+    def lyapunov_exponent(self) -> Estimate | None:
+        """λ."""
+        return self.estimates[LYAPUNOV_EXPONENT.name]
+
+    @property
+    def stability_index(self) -> Estimate | None:
+        """δ_p."""
+        return self.estimates[STABILITY_INDEX.name]
+
+    @property
+    def variance_rate(self) -> Estimate | None:
+        """Λ″(0)."""
+        return self.estimates[VARIANCE_RATE.name]
+
+    def moment(self, p: float) -> Estimate | None:
+        """Λ at one p; None where it is not known."""
+        for place in np.flatnonzero(self.moments.p == p).tolist():
+            value, error = self.moments.value[place], self.moments.error_estimate[place]
+            return Estimate(float(value), float(error), 0.0, quantity=moment_at(p))
+        return None
+
+    @property
+    def status(self) -> Status:
+        """Whether all that was asked for is there, within rtol."""
+        if self.failures:
+            return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
+        codes = {message_of(each).code for each in self.warnings}
+        if not codes.isdisjoint((Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED)):
+            return Status.BEYOND_RTOL
+        return Status.NO_INDEX if Code.INDEX_MISSING in codes else Status.CONVERGED
+
+    @property
+    def remarks(self) -> dict[Severity, Sequence[str]]:
+        """What is said of it, by how much that means."""
+        reasons = [failure.reason for failure in self.failures]
+        return {Severity.FAILURE: reasons, Severity.WARNING: self.warnings, Severity.NOTE: self.notes}
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
+        found = self.moments
+        numbers: dict[Quantity, Any] = {each: getattr(found, name) for name, each in OVER_P.items()}
+        for name, each in self.estimates.items():
+            if each:
+                numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}
+        title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), {P: found.p}
+        more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
+        return dataset(title, "finite elements", numbers, places, self.curve.parameters, **more)
+
+    def _said(self) -> str:
+        found, exponent = self.moments, self.lyapunov_exponent
+        parts = [self.curve.label, self.status.word, f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
+        return ", ".join(filter(None, parts))
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedCurve:
+    """What the simulation of one parameter set found.
+
+    Attributes:
+        curve: the parameter set.
+        result: λ and Λ(p) of the linear system.
+        response: the stationary response of the nonlinear system; None where there is none.
+        warnings: what limits these numbers.
+        interrupted: whether the simulation was stopped early.
+    """
+
+    curve: Curve
+    result: MonteCarlo
+    response: Response | None
+    warnings: tuple[Message, ...]
+    interrupted: bool = False
+
+    @property
+    def remarks(self) -> dict[Severity, Sequence[str]]:
+        """What is said of it."""
+        return {Severity.WARNING: self.warnings}
+
+    @property
+    def estimates(self) -> dict[str, tuple[float, float]]:
+        """λ, Λ″(0) and what is counted at a wall, each with its standard error; a simulation gives no δ_p."""
+        found = self.result
+        return {
+            LYAPUNOV_EXPONENT.name: (found.lyapunov_exponent, found.lyapunov_exponent_error),
+            VARIANCE_RATE.name: (found.variance_rate, found.variance_rate_error),
+            **found.wall,
+        }

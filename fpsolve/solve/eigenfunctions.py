@@ -1,0 +1,101 @@
+"""Eigenfunctions over phase and noise, and the stationary density, for files and pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from fpsolve.analysis.density import stationary_density
+from fpsolve.case.case import Case
+from fpsolve.case.sections import EIGENFUNCTIONS
+from fpsolve.errors import NotConverged
+from fpsolve.exponent.density import MOST_NEGATIVE, UNRESOLVED, densities
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.method import PHASE_AND_NOISE, Pictures
+from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import MOMENT
+from fpsolve.solve.question import Job, Question, Reason, Settings, attempt
+
+
+@dataclass(frozen=True, eq=False)
+class Eigenfunctions:
+    """What is written of a curve.
+
+    Attributes:
+        pairs: those at the p that are shown.
+        stationary: that at p = 0; None where it is not to be trusted.
+        has_density: whether the stationary density is wanted for itself.
+    """
+
+    pairs: tuple[PrincipalPair, ...]
+    stationary: PrincipalPair | None
+    has_density: bool
+
+
+def shown_of(case: Case, number: int) -> Settings | None:
+    """The p that are shown of a curve, of the first also unasked, and whether its stationary density goes with them."""
+    is_named = case.output.asks_for_eigenfunctions
+    p = case.shown.tolist() if is_named or number == 1 else []
+    has_density = is_named and not case.method.no_picture and (number == 1 or bool(p))
+    return {"p": p, "density": has_density} if p or has_density else None
+
+
+def without_failed(job: Job, p: Sequence[float]) -> list[float]:
+    """Those of some p at which Λ(p) did not fail."""
+    moments = job.found(MOMENT.name)
+    failed = {failure.p for failure in moments.failures} if moments else ()
+    return [each for each in p if each not in failed]
+
+
+def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
+    """The pairs that converge, that at p = 0 if it is to be trusted; what is said of them."""
+    found = [attempt(partial(job.solver.pair, p), EIGENFUNCTIONS) for p in (*without_failed(job, settings["p"]), 0.0)]
+    *pairs, stationary = (None if isinstance(each, Reason) else each for each in found)
+    known = tuple(each for each in pairs if each is not None)
+    said = list[Message]()
+    try:
+        if stationary is not None:
+            stationary_density(stationary)
+    except NotConverged as failure:
+        stationary = None
+        said.append(Message(Code.NOTHING_DRAWN, reason=failure.reason, remedy=job.solver.method.refinement))
+    for pair in () if said else known:
+        tilted = densities(pair)
+        limits = {
+            "T": (pair.sign_defects[0], UNRESOLVED),
+            "T_adjoint": (pair.sign_defects[1], UNRESOLVED),
+            "tilted_density": (tilted.grid.negative_share(tilted.fields.tilted_density), MOST_NEGATIVE),
+        }
+        for name, (defect, most) in limits.items():
+            said += [Message(Code.UNREADABLE, name=name, p=pair.p, size=defect)] * (defect > most)
+    job.pictures[EIGENFUNCTIONS] = Eigenfunctions(known, stationary, settings["density"])
+    return tuple(said)
+
+
+def question_of_pictures(
+    pictures: Pictures,
+    symbol: str,
+    solve: Callable[[Job, Settings], tuple[Message, ...]],
+    names: str,
+) -> Question:
+    """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
+
+    Args:
+        pictures: what is drawn.
+        symbol, solve, names: see `Question`.
+    """
+    return Question(
+        pictures.part,
+        lambda case, number: shown_of(case, number) if case.method.pictures == pictures else None,
+        solve,
+        tuple[Message, ...],
+        symbol,
+        said=lambda found, *_: found,
+        draws=True,
+        names=names,
+    )
+
+
+NAMES = r"(curves|eigenfunctions(-\d+)?)\.pvd|eigenfunctions(-\d+)?/p[+-][\d.e+-]+\.vtu|density\.vtu|show\.py"
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, NAMES)

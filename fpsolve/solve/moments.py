@@ -1,0 +1,126 @@
+"""Λ(p) of a curve at the p of its case, and of each of its blocks or rays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import OF_MOMENTS
+from fpsolve.data import Quantity
+from fpsolve.exponent.error import Failure, InvariantClass, Moment
+from fpsolve.exponent.solver import solve_moments
+from fpsolve.messages import Code, Message
+from fpsolve.model.quantity import MOMENT, OVER_P
+from fpsolve.solve.curve import CurveResult, MomentColumns
+from fpsolve.solve.question import UNFINISHED, Job, Numerics, Question, Settings
+from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """What is found of Λ(p), beside the rows of the p at which it did not fail.
+
+    Attributes:
+        failures: why some p are missing.
+        warnings: what limits the numbers.
+        notes: on them, and where the theories compared with are not valid.
+    """
+
+    failures: tuple[Failure, ...] = ()
+    warnings: tuple[Message, ...] = ()
+    notes: tuple[Message, ...] = ()
+
+
+def _settings(case: Case, number: int) -> Settings:
+    p = case.p.tolist() if MOMENT.name in case.asked else []
+    every = not case.method.is_function and not {*OF_MOMENTS}.isdisjoint(case.asked)
+    return {"p": p, "slopes": True, "every_slope": every}
+
+
+def _solve(job: Job, settings: Settings) -> Moments:
+    """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
+    problem, has_slopes = job.curve.problem, settings["slopes"]
+    known = {
+        p: Moment(value, slope, slope_error, error, residual)
+        for p, (value, slope, error, slope_error, residual, _) in job.rows.items()
+    }
+
+    def advance() -> None:
+        for p in known.keys() - job.rows.keys():
+            found = known[p]
+            closed = float(perturbed_moments(problem, np.array(p)))
+            job.rows[p] = found.value, found.derivative, found.error, found.derivative_error, found.residual, closed
+        job.advance()
+
+    refused = {p: told for p in settings["p"] if (told := job.solver.method.reason(p))}
+    for _ in refused:
+        job.advance()
+    computed = [p for p in settings["p"] if p not in refused]
+    found = solve_moments(job.solver, computed, progress=advance, known=known if has_slopes else None)
+    slopes = found.derivative if settings.get("every_slope") else found.slope
+    columns = MomentColumns(
+        p=found.p,
+        value=found.value,
+        derivative=slopes,
+        error_estimate=found.error_estimate,
+        derivative_error=found.errors_of(slopes) if has_slopes else np.full(found.p.shape, np.nan),
+        residual=found.residual,
+        perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
+    )
+    job.rows |= {p: row for p, *row in np.column_stack([*vars(columns).values()]).tolist()}
+    notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
+    return Moments(
+        (*(Failure(p, reason) for p, reason in refused.items()), *found.failures),
+        tuple(found.warnings),
+        tuple(note for note in notes if note is not None),
+    )
+
+
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    of_p = OVER_P if MOMENT.name in case.asked else {}
+    return {each: result and getattr(result.moments, name) for name, each in of_p.items()}
+
+
+QUESTION: Question = Question(
+    MOMENT.name,
+    _settings,
+    _solve,
+    Moments,
+    said=lambda found, *_: (*found.warnings, *found.notes),
+    lacks=lambda found, _: (each.reason for each in found.failures),
+    numbers=_numbers,
+)
+
+
+def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
+    return job.solver.by_class(job.columns.p) if QUESTION.name in job.entries else ()
+
+
+def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: Numerics) -> Iterator[Message]:
+    """That there are such classes, and their λ."""
+    if len(classes) < 2:
+        return
+    problem, rates = curve.problem, [each.lyapunov_exponent.value for each in classes]
+    if classes[0].phase is None:
+        is_hidden = not set(classes[0].variables) <= set(problem.linear.states)
+        yield Message(
+            Code.BLOCKS, blocks=[f"({', '.join(each.variables)})" for each in classes], is_hidden=is_hidden, rates=rates
+        )
+    else:
+        along, across = rates
+        yield Message(Code.INVARIANT_CLASSES, phase=classes[0].phase, along=along, across=across)
+
+
+CLASSES: Question = Question(
+    "classes",
+    _settings,
+    _solve_classes,
+    tuple[InvariantClass, ...],
+    said=_said_of_classes,
+    lacks=lambda found, settings: [UNFINISHED for each in found if {*each.p.tolist()} != {*settings["p"]}],
+)
+"""λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""

@@ -1,0 +1,24 @@
+"""All questions, in the order of work: what needs another one stands after it."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from fpsolve.case.sections import PARTS
+from fpsolve.solve import directions, discretisation, indices, intervals, moments, rate_function
+from fpsolve.solve.question import Question
+
+QUESTIONS: tuple[Question, ...] = (
+    moments.QUESTION,
+    rate_function.QUESTION,
+    *indices.INDEX_QUESTIONS,
+    indices.THEORY,
+    moments.CLASSES,
+    *(import_module(f"fpsolve.solve.{name}").QUESTION for name in PARTS),
+    intervals.QUESTION,
+    directions.QUESTION,
+    discretisation.QUESTION,
+)
+"""Each is solved, said and written in this order."""
+BY_NAME = {each.name: each for each in QUESTIONS}
+"""All of them by their names."""

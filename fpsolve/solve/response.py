@@ -1,0 +1,103 @@
+"""The stationary response of a curve with terms of degree 3, or of degree 0 with a delay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
+from fpsolve.case.sections import RESPONSE
+from fpsolve.data import Quantity
+from fpsolve.exponent.error import Estimate
+from fpsolve.exponent.forced import stationary_moments
+from fpsolve.exponent.method import Budget
+from fpsolve.model.noise import Noise
+from fpsolve.model.problem import Problem
+from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity
+from fpsolve.solve.question import Job, Question, Settings, estimated
+
+if TYPE_CHECKING:
+    from fpsolve.nonlinear.response import StationaryResponse
+
+
+MOST_GRIDS = 10
+"""Largest number of curves of which densities are written."""
+Grid = tuple[int, int, int]
+"""How many amplitudes, phases and values of the noise."""
+SPREAD = 4.0
+"""Standard deviations of the noise on each side of its mean in which its values lie."""
+
+
+def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:
+    """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
+    if problem.linear.forced:
+        moments = stationary_moments(problem, rtol)
+        squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
+        estimates = [Estimate(value, error, abs(value)) for value, error in squares]
+        return CurveResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
+    from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
+
+    found = stationary_response(problem, rtol=rtol, budget=budget)
+    return CurveResponse(
+        found.means,
+        found.impact_rate,
+        found.balance,
+        found.stability_index,
+        found.minimum_over_maximum,
+        found.unknowns,
+        None if grid is None else _density(found, grid),
+    )
+
+
+def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
+    amplitudes, phases, values = grid
+    problem = found.problem
+    a = (np.arange(amplitudes) + 0.5) * found.reach / amplitudes
+    phi = found.flow.phases(phases)
+    xi = _values_of(problem.valued, values)
+    whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
+    of_plane = found.polar_density(a[:, None], phi)
+    return ResponseDensity(
+        a, phi, xi, found.amplitude_density(a), of_plane, np.array(whole, dtype=np.float32).astype(float)
+    )
+
+
+def _values_of(noise: Noise, count: int) -> FloatArray:
+    """Middles of cells in which nearly all of the noise is."""
+    far = SPREAD * noise.standard_deviation
+    low, high = max(noise.mean - far, -noise.half_width), min(noise.mean + far, noise.half_width)
+    return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
+
+
+def _settings(case: Case, number: int) -> Settings | None:
+    """The tolerance of the response, which is its own, and the grid of its density if there are few curves."""
+    if not case.has_response:
+        return None
+    grid = case.response.grid
+    places = [grid.amplitude, grid.phi, grid.xi] if case.planned <= MOST_GRIDS else None
+    return {"rtol": case.response.rtol, "grid": places}
+
+
+def _solve(job: Job, settings: Settings) -> CurveResponse:
+    grid = settings["grid"] and tuple(settings["grid"])
+    return solve_response(job.curve.problem, settings["rtol"], grid, job.numerics.budget)
+
+
+def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    about = case.problem.linear.response.numbers if case.has_response else {}
+    found = result.response.numbers if result and result.response else {}
+    return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
+
+
+QUESTION: Question = Question(
+    RESPONSE,
+    _settings,
+    _solve,
+    CurveResponse,
+    RESPONSE,
+    numbers=_numbers,
+    names=r"response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)",
+)

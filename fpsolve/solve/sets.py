@@ -1,0 +1,151 @@
+"""Solving the curves of a case one by one: each begins anew, so that its numbers follow from its parameters alone.
+
+(To start from a neighbour's mesh saves half of the time of one p in strong noise, and nothing of several p, or in weak
+noise.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from time import process_time
+
+import numpy as np
+
+from fpsolve.budget import begin
+from fpsolve.case.case import Case
+from fpsolve.case.refusals import obstacle
+from fpsolve.exponent.error import Failure
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.quantities import INDICES
+from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
+from fpsolve.solve.curve import NO_MOMENTS, CurveResult
+from fpsolve.solve.moments import CLASSES, Moments
+from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.question import UNFINISHED, Asked, Entry, Job, Limit, Question, Reason, attempt
+from fpsolve.solve.questions import BY_NAME, QUESTIONS
+
+ANEW: Limit = (0.0, 0.0)
+"""The limit of what failed for a reason that may be gone the next time."""
+
+
+def everything(case: Case, number: int = 1) -> Asked:
+    """What a case asks for, of the curve with a number."""
+    asked = {each.name: each.asked(case, number) for each in QUESTIONS if each.solve}
+    return {name: settings for name, settings in asked.items() if settings is not None}
+
+
+def solve_curve(job: Job) -> Job:
+    """Solve what is not known of a parameter set, one after the other; what is missing is an entry with its reason."""
+    planned = [each for each in QUESTIONS if each.symbol and each.name in job.asked]
+    p = job.asked[MOMENTS.name]["p"]
+    job.meter.planned = len(p) + len(planned)
+    with job.meter.running():
+        if MOMENTS.name not in job.entries:  # moments of even order take little
+            attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
+        first = [BY_NAME[LYAPUNOV_EXPONENT.name]] if choose(job.curve.problem).is_dear(0.0) else []
+        for each in dict.fromkeys((*first, *QUESTIONS)):
+            is_known = each.name in job.entries
+            if each.solve is None or each.name not in job.asked or (is_known and not each.draws):
+                continue
+            if each is not MOMENTS:
+                begin(each.symbol)
+            started = process_time()
+            found = attempt(partial(each.solve, job, job.asked[each.name]), each.symbol)
+            if is_known:  # it was drawn again, and its numbers stay as they are
+                continue
+            job.add(each.name, _entry(job, each, found, process_time() - started))
+            if each is MOMENTS and isinstance(found, Reason):  # nor will there be anything else
+                break
+    return job
+
+
+def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry:
+    """What became of a question."""
+    if isinstance(found, Reason):
+        return Entry(None, found, seconds, ANEW if _may_pass(found.message) else job.numerics.limit)
+    said, lacking = question.said(found, job.curve, job.numerics), [*question.lacks(found, job.asked[question.name])]
+    lacking += [each for each in said if each.severity is not Severity.NOTE]
+    limit = job.numerics.limit if lacking else None
+    return Entry(found, None, seconds, ANEW if any(map(_may_pass, lacking)) else limit)
+
+
+def _may_pass(message: Message) -> bool:
+    """Whether a reason may be gone the next time."""
+    return message.tells_of(Code.NO_MEMORY) or message.tells_of(Code.FAULT)
+
+
+def solve_set(job: Job) -> Job:
+    """Solve what is not known of a set; one which contradicts itself, or overflows, fails."""
+    p = np.array(job.asked[MOMENTS.name]["p"])
+    if text := obstacle(job.curve.base, job.curve.varied, p, with_moments=False):
+        found: Job | Reason = Reason("failed", message_of(f"{job.line}{text}"), job.curve.label)
+    else:
+        found = attempt(partial(solve_curve, job), job.curve.label)
+    if isinstance(found, Reason):
+        job.add(MOMENTS.name, Entry(None, found, limit=ANEW))
+    return job
+
+
+def result_of(job: Job) -> CurveResult:
+    """What is known of a curve, as one result; why something is missing is in its `failures`, `warnings` or `notes`."""
+    curve, asked, entries = job.curve, job.asked, job.entries
+    if (entry := entries.get(MOMENTS.name)) and entry.reason:
+        reason = Failure(None, entry.reason.message)
+        return CurveResult(curve, NO_MOMENTS, dict.fromkeys(INDICES), failures=(reason,))
+    known = {name: entry.found for name, entry in entries.items() if name in asked and entry.found is not None}
+    moments: Moments = known.get(MOMENTS.name, Moments())
+    said: dict[Severity, list[Message]] = {each: [] for each in Severity}
+    reasons = list[tuple[Question, Reason]]()
+    for each in QUESTIONS:
+        if each.name in known:
+            for message in each.said(known[each.name], curve, job.numerics):
+                said[message.severity].append(message)
+        elif (entry := entries.get(each.name)) and entry.reason and each.name in asked and each.symbol:
+            reasons.append((each, entry.reason))
+    for message in missing(reasons, moments.failures):
+        if job.numerics.is_stated or not message.tells_of(Code.NOT_ONE_RAY):
+            said[message.severity].append(message)
+    is_whole = all(name in entries or BY_NAME[name].draws for name in asked)
+    failures = moments.failures or tuple(Failure(None, message) for message in said[Severity.FAILURE])
+    return CurveResult(
+        curve=curve,
+        moments=job.columns,
+        estimates={name: known.get(name) for name in INDICES},
+        discretisation=known.get("discretisation") or None,
+        warnings=tuple(said[Severity.WARNING]),
+        notes=tuple(said[Severity.NOTE]),
+        failures=failures if is_whole else (*failures, Failure(None, UNFINISHED)),
+        classes=known.get(CLASSES.name, ()),
+        parts={name: found for name, found in known.items() if name not in _OWN},
+        seconds=sum(entry.seconds for name, entry in entries.items() if name in asked),
+    )
+
+
+_OWN = {MOMENTS.name, *INDICES, CLASSES.name, "discretisation"}
+"""Names of questions that have attributes of their own in a result."""
+
+
+def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failure]) -> Iterator[Message]:
+    """What is said of numbers that are missing, of indices with one reason together.
+
+    Args:
+        reasons: by the questions.
+        failures: the p at which Λ(p) failed, which others may follow from.
+    """
+    unsolved = {each.reason: Message(Code.NO_MOMENT, p=each.p) for each in failures if each.p is not None}
+    codes = {"absent": Code.INDEX_ABSENT, "impossible": Code.INDEX_MISSING}
+    failing = Code.INDEX_MISSING if failures else Code.INDEX_FAILED
+    groups = dict[tuple[Code, Message, str], list[str]]()
+    for question, reason in reasons:
+        message, code = reason.message, codes.get(reason.kind, failing)
+        if question.name in _OWN:
+            message = unsolved.get(message, message) if reason.kind == "failed" else message
+        elif message.severity is not Severity.FAILURE:
+            yield message
+            continue
+        group = "" if question.name in _OWN else question.name
+        groups.setdefault((code, message, group), []).append(reason.symbol)
+    for (code, message, _), symbols in groups.items():
+        yield Message(code, symbols=symbols, reason=message)

@@ -1,0 +1,122 @@
+"""Simulations of the curves of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from fpsolve.analysis.target import said
+from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import MonteCarloSection
+from fpsolve.errors import FpsolveError
+from fpsolve.messages import Code, Message
+from fpsolve.pool import processors
+from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
+from fpsolve.solve.curve import SimulatedCurve
+from fpsolve.solve.question import idle
+from fpsolve.solve.records import key_of
+
+if TYPE_CHECKING:
+    from fpsolve.simulation import MonteCarlo, Response
+
+
+Simulation: TypeAlias = "tuple[MonteCarlo, Response | None, tuple[Message, ...], bool]"
+"""What a simulation finds, see `SimulatedCurve`."""
+RECORDS = "records/simulated.jsonl"
+"""The file of the records of simulations."""
+SIGNIFICANT = 3.0
+"""Standard errors by which λ must exceed 0 before a stationary response is sought."""
+
+
+def simulation_steps(curve: Curve) -> int:
+    """How often the simulation of a curve reports progress."""
+    return PROGRESS_STEPS * (3 if curve.problem.linear.cubic else 1)
+
+
+def refuse_obstacles(case: Case) -> None:
+    """Refuse a case some curve of which cannot be simulated, or a number of processors that is none.
+
+    Raises:
+        FpsolveError: with the curve and the reason.
+    """
+    processors()
+    for curve in case.curves():
+        place = f"with {curve.label}: " if curve.varied else ""
+        try:
+            parts = simulated_parts(curve.problem)
+        except (FpsolveError, ValueError) as failure:
+            raise FpsolveError(f"{case.path}: {place}{said(failure)}") from None
+        found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
+        for name, sentence in found.items():
+            raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
+
+
+def simulate_curve(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = idle
+) -> SimulatedCurve:
+    """Simulate one curve, see `simulation_of`."""
+    return SimulatedCurve(curve, *simulation_of(curve, orders, setting, progress))
+
+
+def simulation_of(
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None]
+) -> Simulation:
+    """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
+
+    Args:
+        curve: the parameters.
+        orders: p of the moments.
+        setting: [monte_carlo] of the case, whose p are not used.
+        progress: called as often as `simulation_steps` says; a task for another process has none.
+
+    Raises:
+        KeyboardInterrupt: nothing was done yet.
+        FpsolveError: as `simulate`.
+    """
+    from fpsolve.simulation.estimators import simulate
+
+    result = simulate(
+        curve.problem, orders, estimator=setting.estimator,
+        paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
+    )  # fmt: skip
+    if not curve.problem.linear.cubic or result.interrupted:
+        return result, None, result.warnings, result.interrupted
+    from fpsolve.simulation.response import no_simulation, simulated_response
+
+    def telling(message: Message, response: Response | None = None, *, interrupted: bool = True) -> Simulation:
+        return result, response, (*result.warnings, message), interrupted
+
+    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+    at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
+    if reason := at_rest if value <= SIGNIFICANT * error else no_simulation(curve.problem):
+        for _ in range(2 * PROGRESS_STEPS):
+            progress()
+        return telling(reason, interrupted=False)
+    try:
+        response = simulated_response(
+            curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+            time=result.time, step=result.step, seed=result.seed, progress=progress,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        return telling(Message(Code.RESPONSE_NOT_REACHED))
+    if response.interrupted:
+        return telling(Message(Code.RESPONSE_STOPPED, time=response.time), response)
+    return result, response, result.warnings, False
+
+
+def form_of_record() -> Any:
+    """The form of a simulation in its record, see `SimulatedCurve`."""
+    from fpsolve.simulation import MonteCarlo, Response
+
+    return tuple[MonteCarlo, Response | None, tuple[Message, ...], bool]
+
+
+def simulation_key(curve: Curve, orders: Sequence[float], setting: MonteCarloSection) -> str:
+    """What the record of a curve is found by."""
+    return key_of(curve.digest, list(orders), setting.model_dump(mode="json"))
+
+
+def is_finished(found: Simulation) -> bool:
+    """Whether a simulation was not stopped early, so that it is recorded."""
+    *_, interrupted = found
+    return not interrupted

@@ -1,0 +1,136 @@
+"""Pictures of an eigenpair: T, T* or their product over phase and noise, or over directions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fpsolve.arrays import FloatArray, shown
+from fpsolve.drawing import MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
+from fpsolve.exponent.density import Grid, on_nodes
+from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
+from fpsolve.model.quantity import PHASE
+from fpsolve.results.nodes import FIELDS, Nodes
+from fpsolve.results.vtk import parameter_lines
+
+FINER = 2
+"""So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
+RED = "#C8102E"
+NEXT_TO_ZERO = 0.05
+"""A least value below this share of the maximum is drawn as 0, which rounding and small errors miss."""
+DECADES = 2
+"""So many powers of ten of T, which is positive, are drawn on a logarithmic scale."""
+Field = Literal["T", "T_adjoint", "tilted_density"]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture that notebooks show.
+
+    Attributes:
+        png: the content of its file.
+    """
+
+    png: bytes
+
+    def save(self, path: str | Path) -> Path:
+        """Write it as a PNG file."""
+        Path(path).write_bytes(self.png)
+        return Path(path)
+
+    def _repr_png_(self) -> bytes:
+        return self.png
+
+
+def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "viridis") -> Picture:
+    """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
+
+    Of more than two variables over directions, see `analysis.DirectionDensity`, as the functions of the pair have it: T
+    as its mean, T* and T T* as densities.
+
+    Args:
+        pair: the eigenpair.
+        field: "T", "T_adjoint", or their product "tilted_density".
+        cmap: the colours, by matplotlib's names.
+
+    Raises:
+        ValueError: there is no such field.
+        OutputError: T depends on more than φ and ξ.
+    """
+    if field not in FIELDS:
+        raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    problem, content = pair.generator.problem, BytesIO()
+    draw = DRAWN[choose(problem).pictures.part]
+    with rc_context(STYLE):
+        figure = Figure(figsize=SIZE, layout="constrained")  # which belongs to no window
+        axes = figure.add_subplot()
+        draw(pair, field, cmap, axes)
+        figure.suptitle(f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)", parse_math=False)
+        axes.set_title("\n".join(parameter_lines(problem.parameters)), fontsize=9, parse_math=False)
+    figure.savefig(content, format="png", dpi=150)
+    return Picture(content.getvalue())
+
+
+def _about(field: str, grid: Grid) -> dict[str, str]:
+    """long_name, symbol and units of a function; densities have the unit of a grid."""
+    quantity = FIELDS[field]
+    return {**quantity.attributes, "units": quantity.unit if field == "T" else grid.unit}
+
+
+def _draw_over_directions(pair: PrincipalPair, field: str, cmap: str, axes: Any) -> None:
+    """A function of directions in colours."""
+    found = on_nodes(pair)
+    found.grid.draw(axes, getattr(found.fields, field), _about(field, found.grid), cmap=cmap)
+
+
+def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, axes: Any) -> None:
+    """A function of phase and noise where it is not negligible, in colours, or as a line for each state of the noise.
+
+    The scale begins at 0 where the least value is next to it, or all are the same.
+    """
+    from matplotlib.colors import LogNorm, Normalize
+
+    nodes, about = Nodes.of(pair, FINER).seen(pair), _about(field, Grid.of(pair))
+    values = nodes.at_xi(getattr(nodes.fields(pair), field))
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    is_log = field == "T" and 0 < 10**DECADES * low < high
+    if nodes.is_lines:
+        _draw_lines(axes, nodes, values, is_log=is_log)
+    else:
+        is_next = abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high
+        norm = LogNorm(low, high) if is_log else Normalize(0.0 if is_next else low, high)
+        draw_colours(axes, nodes.phi.ravel(), nodes.xi, values.T, about, shading="gouraud", cmap=cmap, norm=norm)
+    for impact in nodes.impacts:
+        axes.axvline(impact, color=RED, linewidth=1.2)
+    axes.set_xticks(*QUARTERS)
+    label_axes(axes, PHASE.attributes, about if nodes.is_lines else pair.generator.problem.noise_quantity.attributes)
+
+
+def _draw_lines(axes: Any, nodes: Nodes, values: FloatArray, *, is_log: bool) -> None:
+    """A line over φ for each value of the noise, with a gap where the function jumps."""
+    phi = np.pad(nodes.phi, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
+    for number, xi in enumerate(nodes.xi):
+        blocks = values[:, number].reshape(nodes.phi.shape)
+        padded = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
+        axes.plot(phi, padded, linewidth=1.6, label=rf"$\xi$ = {xi:g}")
+    axes.set_xlim(0, 2 * math.pi)
+    if is_log:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    if 1 < nodes.xi.size <= MOST_LINES:
+        add_legend(axes)
+
+
+DRAWN = {PHASE_AND_NOISE.part: _draw_over_noise, DIRECTIONS.part: _draw_over_directions}
+"""What draws each of the `Pictures`."""

@@ -1,0 +1,174 @@
+"""A fitted noise in words, tables and a picture."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri
+
+from fpsolve.analysis.spreads import LEVEL
+from fpsolve.arrays import FloatArray
+from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
+from fpsolve.measured import NoiseFit
+from fpsolve.measured.signals import SIGNALS
+from fpsolve.measured.spectrum import SIDES, UNITS
+from fpsolve.solve.noise import SIGNAL_WORDS, Critical, NoiseOutcome, density_of
+from fpsolve.tell.blocks import Block, Column, Grid, Sentence
+from fpsolve.tell.notes import note_on
+from fpsolve.tell.text import likely, sampled
+
+
+@dataclass(frozen=True)
+class Convention:
+    """How densities are shown: as the file has them, or one-sided per Hz.
+
+    Attributes:
+        per: "Hz" or "rad/s".
+        sided: "one" or "two".
+    """
+
+    per: str
+    sided: str
+
+    @property
+    def factor(self) -> float:
+        """G over S: 2 for one-sided values per Hz, 1/π per rad/s."""
+        return 1 / SIDES[self.sided] / (2 * math.pi if self.per == "rad/s" else 1.0)
+
+    def frequency(self, omega: Any) -> Any:
+        """ω in the unit of frequencies."""
+        return omega / UNITS[self.per]
+
+    @property
+    def symbol(self) -> str:
+        return "f" if self.per == "Hz" else "ω"
+
+    def unit(self, noise_in: str) -> str:
+        """Of densities."""
+        per = {"Hz": "Hz", "rad/s": "(rad/s)"}[self.per]
+        return f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
+
+
+def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
+    """Ends of the interval that holds S with `LEVEL` by each measured value, of the law of a mean of periodograms."""
+    spectrum = fit.spectrum
+    if spectrum.relative_error is None:
+        return None
+    freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)
+    low, high = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
+    return low, high
+
+
+def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
+    """noise.png and .pdf: what was measured with its 95 % interval, what was fitted, the frequencies that matter."""
+    fit, noise_in = outcome.fit, outcome.wanted.noise_in
+    spectrum, words = fit.spectrum, SIGNAL_WORDS[noise_in]
+    paths = [folder / f"noise.{ending}" for ending in ("png", "pdf")]
+    factor, x = shown.factor, shown.frequency(spectrum.frequencies)
+    fine = np.geomspace(spectrum.frequencies[0], spectrum.frequencies[-1], 400)
+    kind = fit.parts[0].kind
+    title = f"{source.name}: {SIGNALS[outcome.wanted.of].words}, fitted by {kind} noise"
+    if len(fit.parts) > 1:
+        title = title.replace(f"{kind} noise", f"{len(fit.parts)} {kind} noises")
+    with figure_for(paths, title) as figure:
+        axes = figure.subplots()
+        if (band := band_of(fit)) is not None:
+            axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
+        source_label = "formula" if spectrum.is_formula else "measured"
+        axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
+        values, _ = density_of(fit, fine.tolist())
+        axes.loglog(shown.frequency(fine), factor * values, "-", color=COLOURS[0], label="fitted")
+        dashed: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.2}
+        for each in fit.misfit:
+            place = shown.frequency(each.omega) if each.omega else x[0]
+            axes.axvline(place, **dashed)
+            name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
+            axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
+                          va="top", color=COLOURS[1], fontsize="small")  # fmt: skip
+        axes.plot([], [], label="what stability depends on", **dashed)
+        axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
+        for axis in (axes.xaxis, axes.yaxis):
+            plain_numbers(axis)
+        low, high = np.nanmin(factor * spectrum.density), np.nanmax(factor * spectrum.density)
+        axes.set_ylim(0.3 * low, 3 * high)
+        symbol = {"Hz": "$f$", "rad/s": r"$\omega$"}[shown.per]
+        label_axes(
+            axes,
+            {"long_name": "frequency", "symbol": symbol, "units": shown.per},
+            {
+                "long_name": f"{shown.sided}-sided density of {words}",
+                "symbol": f"$G({symbol.strip('$')})$",
+                "units": shown.unit(noise_in),
+            },
+        )
+
+
+def show(outcome: NoiseOutcome, source: Path, shown: Convention) -> Iterator[Block]:
+    """The fit, its meaning, and what limits it."""
+    if outcome.fit.misfit:
+        yield misfit_grid(outcome, source, shown)
+    yield from map(Sentence, sentences(outcome))
+    for message in (*outcome.fit.messages, *filter(None, [outcome.failure])):
+        yield note_on(source.name, message)
+
+
+def misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid:
+    """A row for each frequency that matters."""
+    fit, noise_in = outcome.fit, outcome.wanted.noise_in
+    headings = "", f"{shown.symbol} ({shown.per})", "S fitted", "± s.e.", "measured/fitted"
+    unit = "s" if noise_in == "stiffness" else "1/s"
+    remark = f"S of the {SIGNAL_WORDS[noise_in]}, two-sided, in {unit}; G = {shown.factor:.4g} S as in the figure"
+    title = f"{source.name}: where stability depends on the noise"
+    grid = Grid(title, [*map(Column, headings), Column("± s.e.", 1)], remark=remark)
+    values, errors = density_of(fit, [each.omega for each in fit.misfit])
+    for each, value, error in zip(fit.misfit, values.tolist(), errors.tolist(), strict=True):
+        name, frequency = each.name.replace("ω", shown.symbol), f"{shown.frequency(each.omega):.4g}"
+        numbers = f"{value:.4g}", f"{error:.2g}", f"{1 + each.relative:.4g}", f"{each.error:.2g}"
+        grid.rows.append([name, frequency, *numbers])
+    return grid
+
+
+def sentences(outcome: NoiseOutcome) -> Iterator[str]:
+    """What the fit means: critical damping ratios, and λ and Λ(2) of the system with their probabilities."""
+    if outcome.exponent and outcome.moment:
+        walls = " without walls" if outcome.wanted.modes.restitution not in (None, 1.0) or outcome.wanted.case else ""
+        exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
+        yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
+    if outcome.verdict is None:
+        if outcome.failure is None:
+            yield _missing(outcome)
+        return
+    is_formula = outcome.fit.spectrum.is_formula
+    for symbol, each, what in (
+        ("λ", outcome.verdict.exponent, "almost every path"),
+        ("Λ(2)", outcome.verdict.moment, "the mean square"),
+    ):
+        if each is not None:
+            number, error = sampled(each.value, each.deviation), "" if is_formula else f" ± {each.deviation:.1g}"
+            fate = likely(what, each.below).partition(" with" if is_formula else "\n")[0]
+            if abs(each.value) <= each.deviation:
+                fate = f"{what} is not decided; measure for longer, or try another --kind"
+            yield f"{symbol} = {number}{error} 1/s: {fate}."
+    if is_formula:
+        return
+    share = outcome.fit.off
+    off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
+    yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
+
+
+def _missing(outcome: NoiseOutcome) -> str:
+    """What to do for λ and Λ(2)."""
+    if len(outcome.wanted.modes.omega) > 1:
+        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new coupled` copies one."
+    return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
+
+
+def _percent(each: Critical) -> str:
+    """A damping ratio in percent with two digits of its error."""
+    value, error = 100 * each.value, 100 * each.standard_error
+    return f"({sampled(value, error)} ± {error:.1g}) %" if error else f"{value:.4g} %"

@@ -1,0 +1,88 @@
+"""What limits the numbers of curves: notes that differ in numbers alone are one, with the worst of these."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from fpsolve.case.case import MOST_DRAWN, Case, Curve
+from fpsolve.case.sections import RESPONSE
+from fpsolve.case.vary import map_key
+from fpsolve.exponent.quantities import STABILITY_INDEX
+from fpsolve.messages import Code, Message, Severity, message_of
+from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.tell.blocks import WORDS, Note
+from fpsolve.tell.limits import EACH, NAMED, NOTES
+
+SUMMARY = "summary.json"
+"""The file of all messages of a run."""
+MONTE_CARLO = "monte_carlo*.json"
+"""The files of all messages of a simulation."""
+
+
+def notes(
+    case: Case, found: Iterable[CurveResult | SimulatedCurve], file: str = SUMMARY, *, count: int | None = None
+) -> Iterator[Note]:
+    """What is said of the curves of a case: of whom, what, whose numbers these are, where the others are.
+
+    Args:
+        case: whose curves these are.
+        found: what was found of them.
+        file: that holds all messages; empty where nothing is written.
+        count: how many curves there are with those of which nothing is said, if these are left out.
+    """
+    if count is None:
+        found = tuple(found)
+        count = len(found)
+    groups: dict[Severity, dict[Any, list[tuple[Message, Curve]]]] = {severity: {} for severity in WORDS}
+    for each in found:
+        for severity, messages in each.remarks.items():
+            for message in map(message_of, messages):
+                is_on_theory = message.code in (Code.STRONG_NOISE, Code.LOAD_LEFT_OUT)
+                if not is_on_theory or (file and shows_perturbed_moments(case, count)):
+                    groups[severity].setdefault(message.kind, []).append((message, each.curve))
+    for severity, kinds in groups.items():
+        for group in list(kinds.values())[:NOTES]:
+            worst, whose = max(group, key=lambda one: -math.inf if one[0].size is None else one[0].size)
+            curves = {curve.number: curve for _, curve in group}
+            who, rest = f"{case.name}: {len(curves)} of {count} curves", ""
+            if len(curves) <= NAMED:
+                *others, last = [curve.label for curve in curves.values()]
+                comma = "; " if any("," in label for label in (*others, last)) else ", "
+                named = " and ".join(filter(None, (comma.join(others), last)))
+                who = f"{case.name}, {named}" if named else case.name
+            if any(message.data != worst.data for message, _ in group):
+                words = "these numbers are of" if worst.size is None else "most for"
+                rest = f"; {words} {whose.label}" if len(curves) > 1 else f"; and {len(group) - 1} more like this one"
+                rest += f" (all in {file})" if file else ""
+            yield Note(severity, f"{who}: {worst}{rest}")
+        if (left := len(kinds) - NOTES) > 0:
+            yield Note(severity, f"{case.name}: {left} more of this kind{f' are in {file}' if file else ''}")
+
+
+def shows_perturbed_moments(case: Case, count: int) -> bool:
+    """Whether the table of so many curves or the figure shows Eq. (37)."""
+    over_p = case.figure.x == "p" and (count <= EACH or case.output.figure)
+    return over_p or (case.figure.moment is not None and case.output.figure and not map_key(case.figure, case.vary))
+
+
+def note_on(name: str, message: str) -> Note:
+    """A message on the whole of what has this name, such as a case."""
+    known = message_of(message)
+    return Note(known.severity, f"{name}: {known}")
+
+
+def left_out(case: Case, *, monte_carlo: bool) -> Iterator[Note]:
+    """What a run leaves out: dots of a simulation that has none to give, pictures, and what nobody has named."""
+    told = list[str]()
+    if monte_carlo and case.figure.y == STABILITY_INDEX.name:
+        told.append("a simulation gives no stability index, so that the figure has no dots")
+    if case.output.asks_for_eigenfunctions and (why := case.method.no_picture):
+        told.append(f"no eigenfunctions are written: {why}")
+    if case.leaves_out_response:
+        why = f"no stationary response is computed, as there are more than {MOST_DRAWN} curves"
+        told.append(f'{why}; name "{RESPONSE}" in [output] quantities to have its means')
+    if case.unasked:
+        told.append(f"there are also {', '.join(case.unasked)}: name them in [output] quantities, or --all")
+    yield from (Note(Severity.NOTE, f"{case.name}: {text}") for text in told)

@@ -1,0 +1,116 @@
+"""Simulated curves as tables and pictures, beside finite elements."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from fpsolve.case.case import Case
+from fpsolve.drawing import Format, figure_for
+from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.model.quantity import OF_STOPS
+from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.tell.blocks import Block, Column, Drawing, Grid, Sentence, filled
+from fpsolve.tell.curves import Shown, grid_of
+from fpsolve.tell.limits import EACH, PICTURES
+from fpsolve.tell.notes import MONTE_CARLO
+from fpsolve.tell.text import fate, sampled, sign_of, units_in_words
+
+SURE = 3
+"""Standard errors from 0 at which a simulated sign is told."""
+COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
+"""The columns of what finite elements have found."""
+
+
+def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
+    """monte_carlo_response.png and .pdf of a curve, if it has a response."""
+    curve = simulated.curve
+    title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
+    return Drawing(title, partial(_draw_response, simulated), name, case.headline)
+
+
+def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: str) -> None:
+    """The density of (x, ẋ) and of the amplitude."""
+    if simulated.response is None:
+        return
+    with figure_for(paths, heading, simulated.curve.held("time"), Format(width=10.5)) as figure:
+        plane, radial = figure.subplots(1, 2)
+        simulated.response.plot(plane)
+        figure.get_layout_engine().set(wspace=0.1)
+        simulated.response.plot_amplitude(radial)
+
+
+def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:
+    """The simulated curves, one by one or a row each."""
+    solved = {result.curve.number: result for result in results}
+    is_short, over_p = len(simulated) <= EACH, case.figure.x == "p"
+    if not (is_short and over_p):
+        yield exponent_grid(case, simulated, solved)
+        if not is_short:
+            yield Sentence(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
+    for each in simulated if is_short else ():
+        result = solved.get(each.curve.number)
+        yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
+        found, unit = each.result, case.units.time
+        if result is None:
+            value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+            meaning = fate("almost every path", value, sign_of(value, SURE * error), unit)
+            yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}: {meaning}.")
+        if over_p:
+            yield moment_grid(case, each, result)
+        yield number_grid(case, each, result)
+        yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
+        if each.response and each.curve.number <= PICTURES:
+            yield simulated_response_figure(case, each)
+
+
+def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+    """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
+    is_direct = any(each.estimator == "direct" for each in simulated.result.estimates)
+    effective = "effective windows" if is_direct else "effective paths"  # a path has many windows
+    columns = [Column("p"), Column(MOMENT.symbol), Column("± s.e."), *COMPARED, Column(effective, 3)]
+    exact = dict(zip(result.moments.p.tolist(), result.moments.value.tolist(), strict=True)) if result else {}
+    rows = []
+    for each in simulated.result.estimates:
+        known = (exact.get(each.p) if each.p else 0.0) if result else None
+        cells = _cells(each.value, each.standard_error, known)
+        rows.append([f"{each.p:g}", *cells, f"{each.effective_paths:.0f}"])
+    return filled("", columns, rows, units_in_words(case.units.time, [MOMENT]))
+
+
+def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+    """λ, Λ″(0) and the means of a response with their standard errors, beside the finite elements."""
+    known, estimates = {**INDICES, **OF_STOPS}, dict(result.estimates if result else {})
+    numbers = [(known[name], each, estimates.get(name)) for name, each in simulated.estimates.items()]
+    if response := simulated.response:
+        means = result.response.means if result and result.response else {}
+        numbers += [(response.about.means[name], each, means.get(name)) for name, each in response.means.items()]
+    rows = [[about.words, about.symbol, *_cells(*each, found and found.value)] for about, each, found in numbers]
+    columns = [Column("quantity", 3, is_text=True), Column("symbol"), Column("value"), Column("± s.e."), *COMPARED]
+    units = units_in_words(case.units.time, [known[name] for name in simulated.estimates])
+    return filled("", columns, rows, units)
+
+
+def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[int, CurveResult]) -> Grid:
+    """λ of each curve by both methods."""
+
+    def cell(i: int, each: SimulatedCurve) -> str:
+        result, found = solved.get(each.curve.number), each.result
+        known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
+        return _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known)[i]
+
+    columns = [Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *COMPARED]
+    shown = [Shown(column, partial(cell, i)) for i, column in enumerate(columns)]
+    shown[0] = shown[0]._replace(numbers=np.array([each.result.lyapunov_exponent for each in simulated]))
+    return replace(grid_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
+
+
+def _cells(value: float | None, error: float | None, known: float | None) -> list[str]:
+    """A number with its standard error; what is known of it, and how far away that is."""
+    row = ["none", ""] if value is None or error is None else [sampled(value, error), f"{error:.1e}"]
+    away = "" if known is None or value is None or not error else f"{(value - known) / error:+.1f}"
+    return [*row, "" if known is None else f"{known:.6g}", away]
