@@ -20,7 +20,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from fpsolve import NonGaussianNoise, Problem
-from fpsolve.drawing import COLOURS
 from fpsolve.errors import NotConverged
 from tests.benchmarks.certified import CertifiedFourierHermite
 from tests.benchmarks.cpu import cpu_seconds, fpsolve_curve
@@ -164,12 +163,12 @@ def draw(name: str, folder: Path) -> None:
             found.append(times(case))
             numbers = ", ".join(f"{code} {1e3 * each:.3g} ms" for code, each in found[-1].items())
             print(f"{name} {curve.label} {x:.3g}: {numbers}", flush=True)
-        for (code, marker), colour in zip(CODES.items(), COLOURS, strict=False):
+        for number, (code, marker) in enumerate(CODES.items()):
             own = [1e3 * each[code] for each in found]
             if np.all(np.isnan(own)):
                 continue
             words = f"{code}, {curve.label}" if curve.label else code
-            axes.plot(curve.x, own, line, color=colour, marker=marker, markersize=4.5, label=words)
+            axes.plot(curve.x, own, line, color=f"C{number}", marker=marker, label=words)
     axes.set(xscale="log", yscale="log", xlabel=label, ylabel="processor time / ms", title=title)
     axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axes.yaxis.set_major_formatter("{x:g}")

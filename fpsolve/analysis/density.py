@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Parameters, Quantity, Result, dataset
-from fpsolve.drawing import MOST_LINES, QUARTERS, add_legend, draw_line, draw_plane
+from fpsolve.drawing import MOST_LINES, QUARTERS, draw_line, draw_plane
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import GRIDS, MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
 from fpsolve.exponent.eigen import PrincipalPair
@@ -100,7 +100,7 @@ class Density(GridDensity):
                 draw_line(axes, found.density[:, k], None, **{"label": rf"$\xi$ = {xi:g}", **kwargs})
             axes.set(ylim=(0, None))
             if 1 < self.xi.size <= MOST_LINES:
-                add_legend(axes)
+                axes.legend()
         else:
             seen = self.xi[self.xi_marginal() > UNSEEN * self.xi_marginal().max()]
             even = {"phi": np.linspace(0, 2 * np.pi, 721), "xi": np.linspace(seen[0], seen[-1], 401)}

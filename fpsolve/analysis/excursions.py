@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from fpsolve.arrays import FloatArray, dense, real_array, real_number, real_numbers, shown
 from fpsolve.budget import unless_over_budget
 from fpsolve.data import Result, dataset
-from fpsolve.drawing import add_legend, in_full, label_axes
+from fpsolve.drawing import label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.density import mean_functions, own_phases, phase_functions
 from fpsolve.exponent.eigen import PrincipalPair
@@ -144,16 +144,16 @@ class Excursion(Result):
         """Both bounds over A, and what lies between them."""
         levels = np.geomspace(1.01, 100.0, 101)
         low, high = self.bounds(levels)
-        [line] = axes.plot(levels, low, **{"label": "bounds", **in_full(kwargs)})
+        both = np.r_[levels, np.nan, levels], np.r_[low, np.nan, high]
+        [line] = axes.plot(*both, **{"label": "bounds", **kwargs})
         colour = line.get_color()
-        axes.plot(levels, high, **{**in_full(kwargs), "color": colour, "label": None})
         axes.fill_between(levels, low, high, color=colour, alpha=0.2, linewidth=0)
         if self.upcrossings is not None:
             count = self.expected_upcrossings(levels)
             axes.plot(levels, count, linestyle="--", color=colour, label="upcrossings for large A")
         axes.set(xscale="log", yscale="log", xlim=(1.0, 100.0))
         label_axes(axes, found[LEVEL.name].attrs, found[LEAST_PROBABLE.name].attrs | {"long_name": "probability"})
-        add_legend(axes)
+        axes.legend()
 
     def _said(self) -> str:
         if self.is_certain:

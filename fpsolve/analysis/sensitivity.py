@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Result, dataset
-from fpsolve.drawing import add_legend, draw_bars
+from fpsolve.drawing import draw_bars
 from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.changed import Changed, scaled
 from fpsolve.exponent.eigen import PairDerivatives
@@ -117,7 +117,7 @@ class Sensitivities(Result):
         draw_bars(axes, bars, [each.shown for each in self.quantities.values()], **kwargs)
         axes.set_xlabel(r"effect of a relative change, $\theta\,\partial/\partial\theta$ (1/time)")
         if bars:
-            add_legend(axes)
+            axes.legend()
 
     def _said(self) -> str:
         what = [*self.indices, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]

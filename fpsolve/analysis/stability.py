@@ -23,7 +23,7 @@ from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, is_whole, real_number, shown
 from fpsolve.budget import Meter, OverBudget
 from fpsolve.data import Result, brief, dataset
-from fpsolve.drawing import add_legend, in_full, label_axes, scale_axis
+from fpsolve.drawing import label_axes, scale_axis
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import BUDGET, Budget
@@ -246,14 +246,13 @@ class Boundary(Result):
         return found
 
     def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        style = {"linewidth": 2, "label": self.target.latex, **in_full(kwargs)}
-        for path in [branch.path for branch in self.branches] or [(np.zeros(0), np.zeros(0))]:
-            [line] = axes.plot(*path, **style)
-            style |= {"color": line.get_color(), "label": None}
+        gap = np.full((2, 1), np.nan)
+        parts = [part for branch in self.branches for part in (gap, branch.path)][1:] or [gap]
+        axes.plot(*np.hstack(parts), **{"label": self.target.latex, **kwargs})
         label_axes(axes, found.x.attrs, found.y.attrs)
         for side, axis in ((axes.xaxis, self.x), (axes.yaxis, self.y)):
             scale_axis(side, axis.scale, (axis.start, axis.stop))
-        add_legend(axes)
+        axes.legend()
 
     def _said(self) -> str:
         branches = f"{len(self.traces)} branch{'es' * (len(self.traces) != 1)}"

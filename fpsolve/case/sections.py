@@ -42,6 +42,7 @@ from fpsolve.case.explain import (
     shown_with_kind,
 )
 from fpsolve.case.keys import leaves
+from fpsolve.drawing import is_math
 from fpsolve.errors import MeshError
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
@@ -353,6 +354,17 @@ def _limits(value: Any) -> tuple[float, float]:
 Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
 
 
+def _drawn(text: str) -> str:
+    """Text that matplotlib can draw."""
+    if "$" in text and not is_math(text):
+        rule = 'must have between dollars what matplotlib can draw; write, for example, "order $p$"'
+        raise ValueError(f"got {shown(text)}; {rule}")
+    return text
+
+
+DrawnText = Annotated[Text, AfterValidator(_drawn)]
+
+
 class FigureSection(Section):
     """[figure]: the axes, what is marked, and how it is set; x is "p" or a varied key."""
 
@@ -369,6 +381,9 @@ class FigureSection(Section):
     ] = "double column"
     xlim: Annotated[Limits | None, parameter("ends of the abscissa", "xlim = [0.0, 4.0]")] = None
     ylim: Annotated[Limits | None, parameter("ends of the ordinate", "ylim = [-0.1, 0.1]")] = None
+    xlabel: Annotated[DrawnText | None, parameter("label of the abscissa", 'xlabel = "order $p$"')] = None
+    ylabel: Annotated[DrawnText | None, parameter("label of the ordinate", 'ylabel = "$g(p)$ (1/s)"')] = None
+    lines: Annotated[bool, parameter("whether curves of perturbation theory are drawn", "lines = false")] = True
     mark: Annotated[
         tuple[MarkedName, ...],
         parameter("what is marked", 'mark = ["stability_index"]', strict=False),

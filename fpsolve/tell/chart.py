@@ -16,7 +16,7 @@ from fpsolve.analysis.regions import Region, Regions
 from fpsolve.analysis.target import Target
 from fpsolve.case.case import Case
 from fpsolve.data import short_names
-from fpsolve.drawing import COLOURS, Format, figure_for, label_axes, scale_axis
+from fpsolve.drawing import Format, figure_for, label_axes, scale_axis
 from fpsolve.solve.chart import Chart, appears, charted
 from fpsolve.tell.blocks import Block, Column, Drawing, Grid, Sentence
 from fpsolve.tell.notes import note_on
@@ -56,16 +56,15 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
         for i, line in enumerate(chart.lines):
-            colour, bifurcation = COLOURS[i % len(COLOURS)], appears(line.target)
+            colour, bifurcation = f"C{i}", appears(line.target)
             for branch in line.branches:
-                axes.plot(*branch.path, color=colour, linewidth=2)
+                axes.plot(*branch.path, color=colour)
                 for start, (_, marker) in SPECIAL.items():
                     chosen = np.array([start in label for label in branch.labels])
-                    hollow = {"color": colour, "markersize": 7, "markerfacecolor": "white"}
-                    axes.plot(branch.x[chosen], branch.y[chosen], marker, **hollow)
+                    axes.plot(branch.x[chosen], branch.y[chosen], marker, color=colour, markerfacecolor="white")
             if line.branches:
                 name = f"{line.target.latex}: {bifurcation}" if bifurcation else line.target.latex
-                axes.plot([], [], color=colour, linewidth=2, label=name)
+                axes.plot([], [], color=colour, label=name)
             for points in chart.closed_forms[i]:
                 axes.plot(points[:, 0], points[:, 1], color=colour, **CLOSED_FORM)
         if any(chart.closed_forms):
@@ -74,7 +73,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
         labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
         for start, (name, marker) in SPECIAL.items():
             if any(start in label for label in labels):
-                axes.plot([], [], marker, label=name, color="0.35", markersize=7, markerfacecolor="none")
+                axes.plot([], [], marker, label=name, color="0.35", markerfacecolor="none")
         for name, letter in small.items():
             axes.plot([], [], " ", label=f"{letter}: {name}")
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.drawing import MOST_LINES, QUARTERS, SIZE, STYLE, add_legend, draw_colours, label_axes
+from fpsolve.drawing import MOST_LINES, QUARTERS, draw_colours, label_axes, styled
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
@@ -66,13 +66,12 @@ def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "
     """
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     problem, content = pair.generator.problem, BytesIO()
     draw = DRAWN[choose(problem).pictures.part]
-    with rc_context(STYLE):
-        figure = Figure(figsize=SIZE, layout="constrained")  # which belongs to no window
+    with styled():
+        figure = Figure(layout="constrained")  # which belongs to no window
         axes = figure.add_subplot()
         draw(pair, field, cmap, axes)
         figure.suptitle(f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)", parse_math=False)
@@ -122,14 +121,14 @@ def _draw_lines(axes: Any, nodes: Nodes, values: FloatArray, *, is_log: bool) ->
     for number, xi in enumerate(nodes.xi):
         blocks = values[:, number].reshape(nodes.phi.shape)
         padded = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
-        axes.plot(phi, padded, linewidth=1.6, label=rf"$\xi$ = {xi:g}")
+        axes.plot(phi, padded, label=rf"$\xi$ = {xi:g}")
     axes.set_xlim(0, 2 * math.pi)
     if is_log:
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     if 1 < nodes.xi.size <= MOST_LINES:
-        add_legend(axes)
+        axes.legend()
 
 
 DRAWN = {PHASE_AND_NOISE.part: _draw_over_noise, DIRECTIONS.part: _draw_over_directions}

@@ -1,7 +1,7 @@
-"""What the figures of a case show: solved curves beside perturbation theory and simulated ones; maps; responses.
+"""What the figures of a case show: solved curves beside perturbation theory and simulated ones; maps.
 
 Up to `MOST_NAMED` curves have a marker each, and a name in the legend. More are thin lines, whose colours tell the
-value of a key.
+value of the key that tells them from each other, or else their number.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import cycle
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,16 +22,14 @@ from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
 from fpsolve.case.vary import legend, map_key
 from fpsolve.data import Quantity
 from fpsolve.drawing import (
-    COLOURS,
     FORMATS,
+    ZERO,
     draw_colours,
     draw_dots,
     figure_for,
     label_axes,
     label_of,
-    mark_zero,
     plain_numbers,
-    points,
     scale_axis,
     scale_of,
 )
@@ -42,15 +41,15 @@ from fpsolve.tell.blocks import Drawing
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.typing import ColorType
+
 MOST_VECTORS = 1000
 """Curves up to which a PDF holds each as a line, not all as a picture."""
 _MARKERS = "osD^v<"  # one fewer than colours, so that both repeat together after 42 curves only
-_TANGENT = 0.2
-"""Length of a tangent, as a share of the width of the axes."""
-_GREY: dict[str, Any] = {"color": "0.35"}
-"""Of what the legend says of all curves."""
-STYLES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
-"""Of lines, for up to so many combinations of keys."""
+_TANGENT = 0.1
+"""Length of half a tangent, as a share of the width of the axes."""
 _BETWEEN = "#00C800"
 """Of the line of zeros between values."""
 Pair = tuple[CurveResult, SimulatedCurve | None]
@@ -78,50 +77,18 @@ class Series:
     slope: float | None = None
 
     @property
-    def every(self) -> int:
-        """Of so many x one has a marker."""
-        return max(1, self.x.size // 25)
+    def path(self) -> FloatArray:
+        """The points (x, y) from the left to the right, shape (n, 2)."""
+        return np.stack([self.x, self.y], axis=1)[np.argsort(self.x, kind="stable")]
 
 
-@dataclass(frozen=True)
-class Encoding:
-    """What tells many curves from each other.
-
-    Attributes:
-        key: the one whose value a colour tells; None where it tells the number of the curve.
-        colours: that value, or the number, of each curve.
-        kinds: for each curve what its line style tells; the same everywhere where it tells nothing.
-        untold: the other keys, each with how many values it has.
-    """
-
-    key: str | None
-    colours: FloatArray
-    kinds: Sequence[Varied]
-    untold: Mapping[str, int]
-
-    @classmethod
-    def of(cls, varied: Sequence[Varied]) -> Encoding:
-        """Of the parameters of some curves: a colour for the key with the most values, line styles for a few sets."""
-        counts = {name: len({each[name] for each in varied}) for name in varied[0]}
-        texts = [name for name in counts if isinstance(varied[0][name], str)]
-        others = [name for name in counts if name not in texts]
-        key = max(others, key=lambda name: counts[name], default=None)
-        sets = len({tuple(each[name] for name in others) for each in varied})
-        if key and counts[key] == sets > 1:  # it tells the curve
-            others = []
-        elif key and math.prod(counts[name] for name in others) == sets > 1:
-            others.remove(key)
-        else:  # none varies, or values side by side, none of which tells the curve
-            key, others = None, []
-        names = [name for name in (*others, *texts) if counts[name] > 1]
-        kinds = [{name: each[name] for name in names} for each in varied]
-        is_told = len({tuple(each.values()) for each in kinds}) <= len(STYLES)
-        return cls(
-            key,
-            np.array([each[key] for each in varied], dtype=float) if key else np.arange(1.0, len(varied) + 1),
-            kinds if is_told else [{}] * len(varied),
-            {} if is_told else {name: counts[name] for name in names},
-        )
+def coloured_by(varied: Sequence[Varied]) -> tuple[str | None, FloatArray]:
+    """The key whose value tells each of some curves from the others, and its values; without one their numbers."""
+    for key, first in varied[0].items():
+        values = [each[key] for each in varied]
+        if not isinstance(first, str) and len(set(values)) == len(varied):
+            return key, np.array(values, dtype=float)
+    return None, np.arange(1.0, len(varied) + 1)
 
 
 def main_figure(
@@ -138,12 +105,18 @@ def main_figure(
     Args:
         table: the numbers of all curves.
     """
-    over = "p" if case.figure.x == "p" else case.about(case.figure.x).words
-    title = f"The {case.figure.quantity.words}, {case.figure.quantity.symbol}, over {over}"
-    setting = case.figure
-    curves = partial(_draw_curves, case, results, simulated, table)
-    other = map_key(setting, case.vary)
-    draw = partial(_draw_map, case, table, (setting.x, other)) if other else curves
+    setting, other = case.figure, map_key(case.figure, case.vary)
+    over = "p" if setting.x == "p" else case.about(setting.x).words
+    title = f"The {setting.quantity.words}, {setting.quantity.symbol}, over {over}"
+
+    def draw(axes: Axes) -> None:
+        if other:
+            _draw_map(case, table, (setting.x, other), axes)
+        else:
+            _draw_curves(case, results, simulated, table, axes)
+        own = {"xlabel": setting.xlabel, "ylabel": setting.ylabel}
+        axes.set(**{name: text for name, text in own.items() if text is not None})
+
     return Drawing(title, partial(_draw, case, results, setting.needed, draw), "figure", case.caption)
 
 
@@ -151,7 +124,7 @@ def _draw(
     case: Case,
     results: Sequence[CurveResult],
     needed: str,
-    draw: Callable[[Any], None],
+    draw: Callable[[Axes], None],
     paths: Sequence[Path],
     heading: str,
 ) -> None:
@@ -163,12 +136,12 @@ def _draw(
 
 
 def _draw_curves(
-    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], table: Table, axes: Any
+    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], table: Table, axes: Axes
 ) -> None:
     setting, samples = case.figure, {each.curve.number: each for each in simulated}
     pairs = [(result, samples.get(result.curve.number)) for result in results]
     if setting.x == "p":
-        shown = _some(len(pairs))
+        shown = _with_theory(case, len(pairs))
         series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
     else:
         series = _over_parameter(case, pairs, _numbers(case, table))
@@ -178,28 +151,25 @@ def _draw_curves(
     is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
     scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
     scale_axis(axes.yaxis, "linear", setting.ylim)
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     _mark(axes, series, colours)
 
 
 def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:
-    """rate_function.png and .pdf, if the case asks for it."""
+    """rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
+
+    def draw(axes: Axes) -> None:
+        shown = _with_theory(case, len(results))
+        series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
+        draw_series(axes, case, series, GROWTH, RATE_FUNCTION)
+
     title = f"The {RATE_FUNCTION.words}, {RATE_FUNCTION.symbol}"
-    draw = partial(_draw, case, results, RATE_FUNCTION.name, partial(_draw_rates, case, results))
-    return Drawing(title, draw, "rate_function", case.headline)
+    return Drawing(title, partial(_draw, case, results, RATE_FUNCTION.name, draw), "rate_function", case.headline)
 
 
-def _draw_rates(case: Case, results: Sequence[CurveResult], axes: Any) -> None:
-    """I(s) at s = Λ′(p) of every p, 0 at s = λ."""
-    shown = _some(len(results))
-    series = [_rates(result, with_theory=i in shown) for i, result in enumerate(results)]
-    draw_series(axes, case, series, GROWTH, RATE_FUNCTION)
-    axes.ticklabel_format(style="sci", scilimits=(-2, 3), useMathText=True)
-
-
-def _some(count: int) -> set[int]:
+def _with_theory(case: Case, count: int) -> set[int]:
     """Places of curves with perturbation theory: all of few, or of many three."""
-    return set(range(count)) if count <= MOST_NAMED else {0, count // 2, count - 1}
+    shown = set(range(count)) if count <= MOST_NAMED else {0, count // 2, count - 1}
+    return shown if case.figure.lines else set()
 
 
 def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
@@ -242,7 +212,7 @@ def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> l
     for pair in pairs:
         others = tuple((name, value) for name, value in pair[0].curve.varied.items() if name != key)
         groups.setdefault(others, []).append(pair)
-    shown, found = _some(len(groups)), []
+    shown, found = _with_theory(case, len(groups)), []
     for i, (others, group) in enumerate(groups.items()):
         x = np.array([float(result.curve.varied[key]) for result, _ in group])
         line = (np.geomspace if x.min() > 0 else np.linspace)(x.min(), x.max(), 200) if i in shown else _NOTHING
@@ -293,107 +263,94 @@ def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:
     return np.array(dots, dtype=float).T if dots else None
 
 
-def draw_series(axes: Any, case: Case, series: Sequence[Series], over: Quantity, about: Quantity) -> Sequence[Any]:
+def draw_series(
+    axes: Axes, case: Case, series: Sequence[Series], over: Quantity, about: Quantity
+) -> Sequence[ColorType]:
     """Draw a quantity over another one for several curves; the colours of these."""
-    is_few = len(series) <= MOST_NAMED
     label_axes(axes, *(each.timed(case.units.time).attributes for each in (over, about)))
-    mark_zero(axes)
-    equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
-    colours = (_draw_few if is_few else _draw_many)(axes, case, series, equation)
+    axes.axhline(0, **ZERO)
+    is_few = len(series) <= MOST_NAMED
+    colours = (_draw_few if is_few else _draw_many)(axes, case, series)
+    theories = [i for i, item in enumerate(series) if np.isfinite(item.line_y).any()]
+    for i in theories:
+        look = {"color": colours[i]} if is_few else {"color": "black", "linestyle": "--", "zorder": 3}
+        axes.plot(series[i].line_x, series[i].line_y, **look)
+    if theories:
+        equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
+        words = f"perturbation, Eq. {equation}" + f", of {len(theories)} curves" * (not is_few)
+        axes.plot([], [], color="0.35" if is_few else "black", linestyle="-" if is_few else "--", label=words)
     if simulated := [item.simulated for item in series if item.simulated is not None]:
-        style: dict[str, Any] = {"marker": ".", "color": "black", "markeredgewidth": points(1), "zorder": 5}
-        style |= {"markersize": points(5 if is_few else 3), "elinewidth": points(1), "capsize": points(3 * is_few)}
-        draw_dots(axes, *np.concatenate(simulated, axis=1), label="Monte Carlo ± 2 standard errors", **style)
+        x, y, error = np.concatenate(simulated, axis=1)
+        draw_dots(axes, x, y, error, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5)
     axes.margins(x=0.03)
     return colours
 
 
-def _draw_few(axes: Any, case: Case, series: Sequence[Series], equation: str) -> Sequence[Any]:
+def _draw_few(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[ColorType]:
     """A colour and a marker for each curve, named in the legend; the colours."""
-    colours = [COLOURS[i % len(COLOURS)] for i in range(len(series))]
-    for i, (item, colour) in enumerate(zip(series, colours, strict=True)):
-        look = {"marker": _MARKERS[i % len(_MARKERS)], "color": colour, "markerfacecolor": "none"}
-        axes.plot(item.line_x, item.line_y, color=colour)
-        axes.plot(item.x, item.y, linestyle="none", markevery=item.every, **look)
-        axes.plot([], [], label=legend(item.varied, case.about), **look)
-    words = case.method.name + " (not all marked)" * any(item.every > 1 for item in series)
-    axes.plot([], [], "o", markerfacecolor="none", label=words, **_GREY)
-    if any(np.any(np.isfinite(item.line_y)) for item in series):
-        axes.plot([], [], "-", label=f"perturbation, Eq. {equation}", **_GREY)
+    colours = [f"C{i}" for i in range(len(series))]
+    join = "none" if case.figure.lines else "-"
+    for item, colour, marker in zip(series, colours, cycle(_MARKERS), strict=False):
+        look = partial(axes.plot, marker=marker, color=colour, markerfacecolor="none")
+        look(*item.path.T, linestyle=join, markevery=max(1, item.x.size // 25))
+        look([], [], label=legend(item.varied, case.about))
+    words = case.method.name + " (not all marked)" * any(item.x.size >= 50 for item in series)
+    axes.plot([], [], color="0.35", linestyle=join, marker="o", markerfacecolor="none", label=words)
     return colours
 
 
-def _draw_many(axes: Any, case: Case, series: Sequence[Series], equation: str) -> Any:
-    """Thin lines and a bar of their colours, of which none is too pale on white; the colours, shape (n, 4)."""
-    from matplotlib import colormaps
+def _draw_many(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[ColorType]:
+    """Thin lines and a bar of their colours, of which none is too pale on white; the colours."""
+    from matplotlib import colormaps, rcParams
     from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap, LogNorm, Normalize
 
-    encoding = Encoding.of([item.varied for item in series])
-    values, is_log = encoding.colours, scale_of(encoding.colours) == "log"
+    key, values = coloured_by([item.varied for item in series])
+    is_log = scale_of(values) == "log"
     dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
-    scale = ScalarMappable((LogNorm if is_log else Normalize)(float(values.min()), float(values.max())), dark)
-    colours, look = scale.to_rgba(values), {"rasterized": len(series) > MOST_VECTORS, "linewidths": points(1)}
-    paths = [np.stack([item.x, item.y], axis=1)[np.argsort(item.x, kind="stable")] for item in series]
-    untold = "".join(f", each for {count} values of {case.about(key).shown}" for key, count in encoding.untold.items())
-    kinds = list({tuple(each.values()): each for each in encoding.kinds}.values())
-    for kind, line in zip(kinds, STYLES, strict=False):
-        chosen = [i for i, each in enumerate(encoding.kinds) if each == kind]
-        lines = LineCollection([paths[i] for i in chosen], colors=colours[chosen], linestyles=[line], **look)
-        axes.add_collection(lines, autolim=True)
-        name = f", {legend(kind, case.about)}" if kind else ""
-        axes.plot([], [], linestyle=line, label=f"finite elements{name}{untold}", **_GREY)
-
-    # dots: curves that have but one point
-    dots = [(*path[np.isfinite(path[:, 1])][0], colour)
-            for path, colour in zip(paths, colours, strict=True) if np.isfinite(path[:, 1]).sum() == 1]  # fmt: skip
-    if dots:
-        x, y, shades = zip(*dots, strict=True)
-        axes.scatter(x, y, s=points(4) ** 2, color=shades)
-
-    theories = [item for item in series if item.line_x.size]
-    label = f"perturbation, Eq. {equation}, of {len(theories)} curves"
-    for place, item in enumerate(theories):
-        style = {"linestyle": (0, (2, 2)), "color": "black", "linewidth": points(1.2), "zorder": 3}
-        axes.plot(item.line_x, item.line_y, label="" if place else label, **style)
-
+    scale = ScalarMappable((LogNorm if is_log else Normalize)(values.min(), values.max()), dark)
+    colours = scale.to_rgba(values)
+    thin, paths = 0.6 * rcParams["lines.linewidth"], [item.path for item in series]
+    axes.add_collection(LineCollection(paths, colors=colours, linewidths=thin, rasterized=len(series) > MOST_VECTORS))
+    axes.plot([], [], color="0.35", linewidth=thin, label=case.method.name)
+    for path, colour in zip(paths, colours, strict=True):
+        known = path[np.isfinite(path[:, 1])]
+        if len(known) == 1:
+            axes.plot(*known.T, "o", color=colour)
     axes.autoscale_view()
-    words = "number of the curve" if encoding.key is None else label_of(case.about(encoding.key).attributes, 36)
+    words = "number of the curve" if key is None else label_of(case.about(key).attributes, 36)
     bar = axes.figure.colorbar(scale, ax=axes, pad=0.02, label=words)
     if is_log:
         plain_numbers(bar.ax.yaxis)
-    return colours
+    return list(colours)
 
 
-def _mark(axes: Any, series: Sequence[Series], colours: Any) -> None:
+def _mark(axes: Axes, series: Sequence[Series], colours: Sequence[ColorType]) -> None:
     """Stability indices as ticks on the zero line, λ as tangents at 0, in the present ends."""
-    from matplotlib.collections import LineCollection
+    from matplotlib import rcParams
 
-    is_few, rasterized = len(series) <= MOST_NAMED, len(series) > MOST_VECTORS
-    roots = [i for i, item in enumerate(series) if item.root is not None]
-    if roots:
-        where, shown = [series[i].root for i in roots], [colours[i] for i in roots]
-        style = {"marker": "|", "linewidths": points(2.2 if is_few else 1.2), "zorder": 4, "rasterized": rasterized}
-        words = f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}"
-        axes.scatter(where, np.zeros(len(roots)), s=points(16 if is_few else 8) ** 2, color=shown, label=words, **style)
-    chosen = [i for i, item in enumerate(series) if item.slope is not None]
-    if chosen:
-        left, right = axes.get_xlim()
-        axes.set(xlim=(left, right), ylim=axes.get_ylim())
-        ends = 0.5 * _TANGENT * (right - left) * np.array([-1.0, 1.0])
-        lines = [np.stack([ends, series[i].slope * ends], axis=1) for i in chosen]
-        look: dict[str, Any] = {"linewidths": points(3 if is_few else 1), "capstyle": "butt", "zorder": 3.5}
-        look |= {"colors": [colours[i] for i in chosen], "label": f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$"}
-        axes.add_collection(LineCollection(lines, rasterized=rasterized, **look), autolim=False)
+    wide = (2.0 if len(series) <= MOST_NAMED else 1.0) * rcParams["lines.linewidth"]
+    marks = list(zip(series, colours, strict=True))
+    if roots := [(item.root, colour) for item, colour in marks if item.root is not None]:
+        x, shown = zip(*roots, strict=True)
+        index = axes.scatter(x, [0] * len(x), (5 * wide) ** 2, shown, marker="|", linewidths=wide, zorder=4)
+        index.set_label(f"{STABILITY_INDEX.words} {STABILITY_INDEX.latex}")
+    ends = _TANGENT * np.ptp(axes.get_xlim()) * np.array([-1.0, 1.0])
+    words = f"slope {LYAPUNOV_EXPONENT.latex} at $p = 0$"
+    for item, colour in marks:
+        if item.slope is not None:
+            [line] = axes.plot(ends, item.slope * ends, color=colour, label=words, scalex=False, scaley=False)
+            line.set(linewidth=wide, solid_capstyle="butt", zorder=3.5)
+            words = "_"
 
 
-def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Any) -> None:
+def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Axes) -> None:
     """A quantity over two keys in colours around zero, hatched where it is not known, grey where there is none.
 
     The line of its zeros is dashed between the values.
     """
-    from matplotlib import patches, path
+    from matplotlib.colors import ListedColormap
 
     setting = case.figure
     (x, column), (y, row) = (
@@ -405,28 +362,24 @@ def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Any) -> Non
     edges = _edges(x), _edges(y)
     label_axes(axes, *(case.about(key).attributes for key in keys))
     _draw_values(axes, values, edges, setting.quantity.timed(case.units.time).attributes)
+    if (values < 0).any() and (values > 0).any():
+        axes.contour(x, y, values, levels=[0.0], colors=_BETWEEN, linestyles="--", zorder=3)
+        axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
+    if failed.any():
+        cells = axes.pcolor(*edges, np.ma.masked_where(~failed, failed), cmap=ListedColormap(["white"]))
+        cells.set(hatch="/////", edgecolor="0.45", linewidth=0, label="failed or not solved")
+    if (np.isnan(values) & ~failed).any():
+        sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
+        axes.set_facecolor("0.8")
+        axes.fill([], [], color="0.8", label=f"no {setting.quantity.words}{sought}")
     limits = setting.xlim, setting.ylim
     for axis, each, ends, limit in zip((axes.xaxis, axes.yaxis), (x, y), edges, limits, strict=True):
         scale_axis(axis, scale_of(each), limit or (float(ends[0]), float(ends[-1])))
-    finite = values[np.isfinite(values)]
-    if finite.size and finite.min() < 0 < finite.max():
-        look: dict[str, Any] = {"linestyles": "--", "linewidths": points(1.5), "zorder": 3}
-        axes.contour(x, y, np.ma.masked_invalid(values), levels=[0.0], colors=_BETWEEN, **look)
-        axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
-    sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
-    unsolved: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.45", "hatch": "/////"}
-    for where, style, label in (
-        (failed, unsolved, "failed or not solved"),
-        (np.isnan(values) & ~failed, {"facecolor": "0.8"}, f"no {setting.quantity.words}{sought}"),
-    ):
-        (i, j), (left, low) = np.nonzero(where), edges
-        if i.size:
-            corners = np.array([(left[j + k], low[i + m]) for k, m in ((0, 0), (1, 0), (1, 1), (0, 1))])
-            cells = path.Path.make_compound_path_from_polys(np.moveaxis(corners, 2, 0))
-            axes.add_patch(patches.PathPatch(cells, linewidth=0, label=label, **style))
 
 
-def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, Any]) -> None:
+def _draw_values(
+    axes: Axes, values: FloatArray, edges: tuple[FloatArray, FloatArray], about: Mapping[str, str]
+) -> None:
     """Blue where it is negative, red where it is positive, told apart by all eyes; colours are alike on both sides.
 
     There are more of them near zero where most values are much smaller than the largest.
@@ -438,15 +391,9 @@ def _draw_values(axes: Any, values: FloatArray, edges: tuple[FloatArray, FloatAr
     limit = float(np.max(sizes, initial=0.0)) or 1.0
     middle = float(np.median(sizes)) if sizes.size else limit
     is_even = limit < 4 * middle
-    look: dict[str, Any] = {
-        "cmap": "RdBu_r",
-        "norm": Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit),
-    }
-    bar = draw_colours(axes, *edges, np.ma.masked_invalid(values), about, shading="flat", **look)
-    if is_even:
-        bar.formatter.set_powerlimits((-2, 3))
-        bar.formatter.set_useMathText(True)
-    else:
+    norm = Normalize(-limit, limit) if is_even else AsinhNorm(middle, -limit, limit)
+    bar = draw_colours(axes, *edges, values, about, shading="flat", cmap="RdBu_r", norm=norm)
+    if not is_even:
         bar.ax.yaxis.set_major_locator(AsinhLocator(middle, numticks=5))
         bar.ax.yaxis.set_major_formatter("{x:g}")
 

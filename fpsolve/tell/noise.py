@@ -13,7 +13,7 @@ from scipy.special import chdtri
 
 from fpsolve.analysis.spreads import LEVEL
 from fpsolve.arrays import FloatArray
-from fpsolve.drawing import COLOURS, figure_for, label_axes, plain_numbers
+from fpsolve.drawing import figure_for, label_axes, plain_numbers
 from fpsolve.measured import NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
@@ -82,14 +82,14 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
         source_label = "formula" if spectrum.is_formula else "measured"
         axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
         values, _ = density_of(fit, fine.tolist())
-        axes.loglog(shown.frequency(fine), factor * values, "-", color=COLOURS[0], label="fitted")
-        dashed: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (4, 2)), "linewidth": 1.2}
+        axes.loglog(shown.frequency(fine), factor * values, "-", color="C0", label="fitted")
+        dashed: dict[str, Any] = {"color": "C1", "linestyle": "--"}
         for each in fit.misfit:
             place = shown.frequency(each.omega) if each.omega else x[0]
             axes.axvline(place, **dashed)
             name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
             axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
-                          va="top", color=COLOURS[1], fontsize="small")  # fmt: skip
+                          va="top", color="C1", fontsize="small")  # fmt: skip
         axes.plot([], [], label="what stability depends on", **dashed)
         axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
         for axis in (axes.xaxis, axes.yaxis):

@@ -63,8 +63,8 @@ def notes(
 
 def shows_perturbed_moments(case: Case, count: int) -> bool:
     """Whether the table of so many curves or the figure shows Eq. (37)."""
-    over_p = case.figure.x == "p" and (count <= EACH or case.output.figure)
-    return over_p or (case.figure.moment is not None and case.output.figure and not map_key(case.figure, case.vary))
+    has_lines = case.output.figure and case.figure.lines and not map_key(case.figure, case.vary)
+    return (case.figure.x == "p" and (count <= EACH or has_lines)) or (case.figure.moment is not None and has_lines)
 
 
 def note_on(name: str, message: str) -> Note:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import RESPONSE, SENSITIVITIES
-from fpsolve.drawing import Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes, points
+from fpsolve.drawing import Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes
 from fpsolve.exponent.density import direction_grid
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
 from fpsolve.model.plane import LinearMotion
@@ -25,6 +25,8 @@ from fpsolve.tell.eigenfunctions import draw_eigenfunction
 from fpsolve.theory.perturbation import scale_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from fpsolve.simulation.response import Response
 
 
@@ -47,7 +49,6 @@ def _draw_response(
         return
     with figure_for(paths, heading, result.curve.held(case.units.time), Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
-        figure.get_layout_engine().set(wspace=0.1)
         _draw_joint_density(plane, found, density, system, case)
         radial.plot(density.amplitude, density.of_amplitude, label="finite elements")
         about = system.response.amplitude, system.response.amplitude_density
@@ -57,13 +58,12 @@ def _draw_response(
         radial.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
         if sample:
             x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
-            look: dict[str, Any] = {"marker": ".", "color": "black", "markersize": points(4), "capsize": points(2)}
-            words = "Monte Carlo ± 2 standard errors"
-            draw_dots(radial, x, sample.amplitude_density, sample.amplitude_error, label=words, **look)
+            dots = x, sample.amplitude_density, sample.amplitude_error
+            draw_dots(radial, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black")
 
 
 def _draw_joint_density(
-    axes: Any, found: CurveResponse, density: ResponseDensity, system: LinearMotion, case: Case
+    axes: Axes, found: CurveResponse, density: ResponseDensity, system: LinearMotion, case: Case
 ) -> None:
     """ρ of both variables in colours over four decades; what is below has the colour of the lowest."""
     from matplotlib.colors import LogNorm

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.drawing import Format, figure_for
+from fpsolve.data import Quantity
+from fpsolve.drawing import Format, figure_for, label_axes, label_of
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.model.quantity import OF_STOPS
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
@@ -30,18 +31,21 @@ def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
     """monte_carlo_response.png and .pdf of a curve, if it has a response."""
     curve = simulated.curve
     title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
-    return Drawing(title, partial(_draw_response, simulated), name, case.headline)
+    return Drawing(title, partial(_draw_response, simulated, case.units.time), name, case.headline)
 
 
-def _draw_response(simulated: SimulatedCurve, paths: Sequence[Path], heading: str) -> None:
+def _draw_response(simulated: SimulatedCurve, time_unit: str, paths: Sequence[Path], heading: str) -> None:
     """The density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
-    with figure_for(paths, heading, simulated.curve.held("time"), Format(width=10.5)) as figure:
+    with figure_for(paths, heading, simulated.curve.held(time_unit), Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
+        of, timed = simulated.response.about, partial(Quantity.timed, unit=time_unit)
         simulated.response.plot(plane)
-        figure.get_layout_engine().set(wspace=0.1)
         simulated.response.plot_amplitude(radial)
+        label_axes(plane, timed(of.first).attributes, timed(of.second).attributes)
+        label_axes(radial, timed(of.amplitude).attributes, timed(of.amplitude_density).attributes)
+        figure.axes[-1].set_ylabel(label_of(timed(of.density).attributes, 36))  # of the colour bar
 
 
 def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:

@@ -10,7 +10,7 @@ from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
 from fpsolve.results.columns import table_of
 from fpsolve.solve.curve import CurveResult, MomentColumns
-from fpsolve.tell.figures import Encoding, main_figure
+from fpsolve.tell.figures import coloured_by, main_figure
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
 from tests.kit import TEXT, case_in
@@ -71,13 +71,18 @@ FIGURES = [
     (
         [many(9), BOTH, "figure.width='single column'"],
         P,
-        [D0],
-        ["finite elements, treatment = exact", "finite elements, treatment = ou-reduction"],
+        ["number of the curve"],
+        ["finite elements"],
     ),
     ([many(8), "figure.mark=['stability_index', 'lyapunov_exponent']"], P, [], [INDEX, "slope $\\lambda$ at $p = 0$"]),
     ([many(9)], P, [D0], ["finite elements", "perturbation, Eq. (37), of 3 curves", INDEX]),
     ([many(2), f"title='{'A title of many words ' * 12}'"], P, [], ["finite elements", INDEX]),
-    ([many(9), "figure={x='noise.D0', y={moment=2.0}}"], D0, [], ["finite elements"]),
+    (
+        [many(9), "figure={x='noise.D0', y={moment=2.0}, xlabel='size $D$', lines=false}"],
+        "size $D$",
+        [],
+        ["finite elements"],
+    ),
 ]
 
 
@@ -89,7 +94,9 @@ def test_figure_has_labels_and_a_legend_that_cover_nothing_on_the_canvas(drawn, 
     assert [each.get_ylabel() for each in others] == bars
     found = [*figure.legends, *(each for axes in figure.axes if (each := axes.get_legend()))]
     words = [text for each in found for text in each.get_texts()]
-    assert set(legend) <= {text.get_text() for text in words}
+    told = {text.get_text() for text in words}
+    assert set(legend) <= told
+    assert not (sets[-1].endswith("lines=false}") and any("perturbation" in text for text in told))
     for mesh in (each for each in axes.collections if type(each).__name__ == "QuadMesh"):
         assert (mesh.norm.vmin, mesh.get_array().shape) == (-mesh.norm.vmax, (9, 9))  # 0 is in the middle
     texts = [*words, *figure.texts, *(text for each in figure.subfigs for text in each.texts)]
@@ -105,20 +112,15 @@ def test_figure_has_labels_and_a_legend_that_cover_nothing_on_the_canvas(drawn, 
                 assert not path.intersects_bbox(box, filled=False)
 
 
-VARIED = [{"a": a, "b": b, "c": c} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0) for c in ("x", "y")]
-
-
 @pytest.mark.parametrize(
-    ("varied", "key", "kinds", "untold"),
+    ("varied", "key"),
     [
-        (VARIED, "b", 4, {}),
-        ([each | {"a": each["a"] + i} for i in range(0, 8, 2) for each in VARIED], "a", 1, {"b": 3, "c": 2}),
-        ([{"a": 1.0, "b": 1.0}, {"a": 2.0, "b": 1.0}, {"a": 2.0, "b": 2.0}], None, 1, {}),
-        ([{"a": 1.0, "b": 3.0}, {"a": 2.0, "b": 1.0}, {"a": 3.0, "b": 1.0}], "a", 1, {}),
-        ([{"c": "x"}, {"c": "y"}], None, 2, {}),
+        ([{"a": a, "b": b} for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0)], None),
+        ([{"a": 1.0, "b": 3.0}, {"a": 1.0, "b": 1.0}], "b"),
+        ([{"c": "x"}, {"c": "y"}], None),
     ],
 )
-def test_colours_and_styles_tell_curves_from_each_other(varied, key, kinds, untold):
-    told = Encoding.of(varied)
-    assert (told.key, len({tuple(each.values()) for each in told.kinds}), told.untold) == (key, kinds, untold)
-    assert told.colours.tolist() == ([each[key] for each in varied] if key else [*range(1, len(varied) + 1)])
+def test_colours_tell_curves_from_each_other(varied, key):
+    numbers = [each[key] for each in varied] if key else [*range(1, len(varied) + 1)]
+    told, values = coloured_by(varied)
+    assert (told, values.tolist()) == (key, numbers)

@@ -50,8 +50,8 @@ def test_figure_marks_each_index_on_the_zero_line_and_each_exponent_as_a_tangent
     [axes] = drawn(*sets).axes
     case = case_in(tmp_path, TEXT, sets)
     theories = [second_order(curve.problem) for curve in case.curves()]
-    paths = [path.vertices for each in axes.collections for path in each.get_paths() if len(path) == 2]
-    slopes = [np.subtract(*path[:, 1]) / np.subtract(*path[:, 0]) for path in paths if path[0, 0] < 0][-3:]
+    paths = [each.get_xydata() for each in axes.lines if each.get_gid() is None and len(each.get_xdata()) == 2]
+    slopes = [np.subtract(*path[:, 1]) / np.subtract(*path[:, 0]) for path in paths]
     np.testing.assert_allclose(slopes, [each.lyapunov_exponent for each in theories])
     [roots] = [each.get_offsets() for each in axes.collections if len(each.get_offsets()) == 3]
     np.testing.assert_allclose(roots, [(each.stability_index, 0.0) for each in theories])
