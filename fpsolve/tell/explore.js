@@ -262,11 +262,11 @@ const drawings = {
   },
   paths(answer) {
     const all = answer.logs.flat(), end = answer.time.at(-1), {exponent} = answer, more = exponent === null ? [] : [exponent * end];
-    const plot = frame($("paths").querySelector("svg"), {ends: [0, end], label: "time"}, {ends: [Math.min(...all, ...more), Math.max(...all, ...more)], label: "ln‖x‖"});
+    const plot = frame($("paths").querySelector("svg"), {ends: [0, end], label: about.time}, {ends: [Math.min(...all, ...more), Math.max(...all, ...more)], label: "ln‖x‖"});
     for (const each of answer.logs) node(plot.inside, "path", {class: "line path", d: line(plot, answer.time, each)});
     if (exponent !== null) node(plot.inside, "path", {class: "line two", d: line(plot, [0, end], [0, exponent * end])});
     const ends = [Math.min(...answer.motion, 0), Math.max(...answer.motion)];
-    const near = frame($("motion").firstChild, {ends: [0, answer.short.at(-1)], label: "time"}, {ends, label: answer.name});
+    const near = frame($("motion").firstChild, {ends: [0, answer.short.at(-1)], label: about.time}, {ends, label: answer.name});
     node(near.inside, "path", {class: "line one", d: line(near, answer.short, answer.motion)});
   },
 };
@@ -283,7 +283,8 @@ function drawViews() {
 function makeViews() {
   const [first, second] = document.querySelectorAll("#map .axis"), axes = knobs.filter(knob => knob.axis);
   for (const select of [first, second]) select.append(...axes.map(knob => new Option([knob.words, knob.key].filter(Boolean).join(", "), knob.key)));
-  second.value = (axes.find(knob => knob.key.startsWith("noise.")) || axes.at(-1)).key;
+  const usual = [axes[0].key, (axes.find(knob => knob.key.startsWith("noise.")) || axes.at(-1)).key], own = about.axes.filter(key => axes.some(knob => knob.key === key));
+  [first.value, second.value] = own.length === 2 ? own : usual;
   const axis = select => { const {key, ends: [start, stop], log} = axes.find(knob => knob.key === select.value); return {key, start, stop, scale: log ? "log" : "linear"}; };
   const questions = {map: () => ({axes: [axis(first), axis(second)]}), field: () => ({p: Number($("field").querySelector(".order").value)}), paths: () => ({})};
   for (const name in questions) $(name).querySelector(".go").onclick = () => {
@@ -329,11 +330,13 @@ async function start() {
   makeViews();
   $("views").onchange = redraw;
   $("reset").onclick = () => { for (const knob of knobs) knob.set(knob.value); moved(); };
-  $("stop").onclick = () => { for (const of of ["curve", "map", "field", "paths", "report"]) ask("stop", {of}); long.clear(); $("state").textContent = "stopped"; $("stop").disabled = true; };
+  $("stop").onclick = () => { ask("stop"); long.clear(); $("state").textContent = "stopped"; $("stop").disabled = true; };
   $("save").onclick = () => work("save", download);
   $("report").onclick = () => work("report", download);
   $("python").onclick = () => work("python", copy);
   addEventListener("resize", redraw);
+  addEventListener("pagehide", () => navigator.sendBeacon("/stop", new Blob([JSON.stringify({page, number: ++number})], {type: "application/json"})));
+  addEventListener("pageshow", event => { if (event.persisted) settle(); }); // shown again by the browser's button for going back
   setInterval(listen, LISTEN);
   await work("solve", showCurve);
 }

@@ -1,31 +1,28 @@
 """What `fpsolve explore` answers: numbers, sentences and curves of a case with other values of its parameters.
 
 A question of a page that is newer than another one of its kind ends that before its next factorisation: the last
-position of a slider wins, and nobody waits for what is not wanted any more.
+position of a slider wins, and nobody waits for what is not wanted any more. So does a page that is closed.
 """
 
 from __future__ import annotations
 
-import math
 import re
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextvars import ContextVar
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
-from functools import partial
 from html import unescape
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
+from fpsolve.analysis.axis import bounds_of
 from fpsolve.budget import Meter, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
-from fpsolve.case.explain import UNBOUNDED, explain
+from fpsolve.case.explain import UNBOUNDED
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.rewrite import rewritten
 from fpsolve.case.sections import FigureSection, Moments, OutputSection
@@ -45,14 +42,14 @@ from fpsolve.solve.sets import everything, result_of, solve_curve
 from fpsolve.tell import solved as results
 from fpsolve.tell.blocks import Sentence
 from fpsolve.tell.html import page_of, part_of_page
-from fpsolve.tell.local import LocalPage
+from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
 from fpsolve.tell.numbers import indices, moment_grid
 from fpsolve.tell.problem import show as show_problem
 from fpsolve.tell.progress import waiting
 from fpsolve.tell.reports import COMPLETE
 from fpsolve.tell.verdict import meaning, verdict
-from fpsolve.tell.views import field_of, listed, map_of, paths_of
+from fpsolve.tell.views import field_of, listed, map_of, paths_of, refusal
 
 MOVING_RTOL = 1e-6
 """Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
@@ -74,9 +71,6 @@ NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
 """The parts that are solved."""
-Answer = Mapping[str, Any]
-"""What JSON can hold."""
-_is_gone: ContextVar[Callable[[], bool]] = ContextVar("is_gone", default=bool)
 
 
 class Explorer:
@@ -99,17 +93,20 @@ class Explorer:
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
         self._written = quantities[: 2 + has_square]
         is_same = np.array_equal(np.sort(case.p), p)
-        changed = {"vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None}
-        changed["moments"] = case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())})
-        changed["output"] = OutputSection(quantities=quantities)
-        self.case = case.model_copy(update={**changed, "system": first.system, "noise": first.noise})
+        changed = {
+            "vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None,
+            "moments": case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())}),
+            "output": OutputSection(quantities=quantities), "system": first.system, "noise": first.noise,
+        }  # fmt: skip
+        self.case = case.model_copy(update=changed)
         few = [p[0], p[-1], *p[(p == 0) | (p == 2)]]
         for each in p:
             if np.min(np.abs(few - each)) >= APART * np.ptp(p):
                 few.append(each)
         self._few, self._drawing = np.unique(few).tolist(), threading.Lock()
-        self._newest, self._so_far = dict[tuple[str, str], float](), dict[str, dict[str, Any]]()
-        self._answers: dict[str, Callable[[Mapping[str, Any]], Answer]] = {
+        self._newest, self._stopped = dict[tuple[str, str], float](), dict[str, float]()
+        self._so_far = dict[str, dict[str, Answer | str]]()
+        self._answers: dict[str, Callable[[Question], Answer]] = {
             "start": self._start,
             "move": self._move,
             "solve": self._solve,
@@ -120,26 +117,34 @@ class Explorer:
             "save": self._save,
             "report": self._report,
             "python": self._python,
-            "stop": lambda _: {},
         }
 
-    def answer(self, name: str, question: Mapping[str, Any], is_gone: Callable[[], bool] = bool) -> Answer:
+    def answer(self, name: str, question: Question, is_gone: Callable[[], bool] = bool) -> Answer:
         """The answer to a question by its name, or a sentence why there is none.
 
         Args:
-            name: "stop" ends what the page asked for "of" a kind.
+            name: "stop" ends all that the page has asked before.
             question: the "page" that asks, its "number", and "values" of parameters by their keys.
             is_gone: whether nobody waits for the answer any more.
         """
-        _is_gone.set(is_gone)
-        kind = {"move": "curve", "solve": "curve", "stop": str(question.get("of"))}.get(name, name)
-        asked, number = (str(question.get("page")), kind), question.get("number")
+        page, number = str(question.get("page")), question.get("number")
         if not isinstance(number, int | float):
             return {"refused": f"got {number!r} as the number of a question; must be a number; load the page again"}
+        if name == "stop":
+            self._stopped[page] = number
+            return {}
+        asked = page, "curve" if name in ("move", "solve") else name
         self._newest[asked] = max(number, self._newest.get(asked, number))
+
+        def look(meter: Meter) -> None:
+            """Before the next factorisation end what is not wanted any more, or let the page know what it waits for."""
+            if is_gone() or self._newest[asked] != number or number < self._stopped.get(page, number):
+                raise KeyboardInterrupt
+            self._so_far.setdefault(page, {})["waits"] = waiting(meter) if meter.number else ""
+
         try:
             started = perf_counter()
-            with watched(partial(self._wait, asked, number)):
+            with watched(look):
                 return {**self._answers[name](question), "seconds": perf_counter() - started}
         except KeyboardInterrupt:
             return {"stopped": True}
@@ -148,25 +153,17 @@ class Explorer:
         except Exception as failure:
             return {"refused": str(fault(failure))}
 
-    def _wait(self, asked: tuple[str, str], number: float, meter: Meter) -> None:
-        """Let the page know what it waits for, before the next factorisation."""
-        self._look(asked, number)
-        self._so_far.setdefault(asked[0], {})["waits"] = waiting(meter) if meter.number else ""
-
-    def _look(self, asked: tuple[str, str], number: float) -> None:
-        """End what is not wanted any more."""
-        if self._newest[asked] != number or _is_gone.get()():
-            raise KeyboardInterrupt
-
-    def _start(self, _: Mapping[str, Any]) -> Answer:
+    def _start(self, _: Question) -> Answer:
         """The sliders, and what the page is about."""
-        unit = MOMENT.timed(self.case.units.time).unit
+        time, chart = self.case.units.time, self.source.chart
         return {
             "title": self.source.title,
             "file": self.source.path.name if self.source.text else "",
             "knobs": list(self._knobs()),
             "moves": self.moves,
-            "unit": unit,
+            "unit": MOMENT.timed(time).unit,
+            "time": "time" if time == "time" else f"time ({time})",
+            "axes": [chart.x.key, chart.y.key] if chart else [],
         }
 
     def _knobs(self) -> Iterator[Answer]:
@@ -174,49 +171,48 @@ class Explorer:
         linear, known = {*self.first.differentiable, *self.first.undifferentiable}, self.first.parameters
         for key in [key for key in known if key in linear]:
             about, value = known[key].quantity.timed(self.case.units.time), float(self.first.values[key])
-            low, high, scale = self._range(key, value)
-            words = "" if about.words == key else about.words
+            low, high, is_log = self._range(key, value)
             yield {
-                "key": key, "words": words, "symbol": _letters(about.latex), "unit": about.unit_in_words,
-                "value": value, "ends": [min(low, value), max(high, value)],
-                "log": scale == "log" and min(low, value) > 0, "axis": key in self.first.differentiable,
+                "key": key, "words": "" if about.words == key else about.words, "symbol": _letters(about.latex),
+                "unit": about.unit_in_words, "value": value, "ends": [min(low, value), max(high, value)],
+                "log": is_log and min(low, value) > 0, "axis": key in self.first.differentiable,
             }  # fmt: skip
 
-    def _range(self, key: str, value: float) -> tuple[float, float, str]:
-        """The ends of a slider: those of a chart, of what is varied, of the parameter, or usual ones."""
+    def _range(self, key: str, value: float) -> tuple[float, float, bool]:
+        """The ends of a slider, those of a chart, of what is varied, of the parameter, or usual ones; if by logarithms.
+
+        What a parameter may not reach is a hundredth of its range away.
+        """
         for axis in (self.source.chart.x, self.source.chart.y) if self.source.chart else ():
             if axis.key == key:
-                return axis.start, axis.stop, axis.scale
+                return axis.start, axis.stop, axis.scale == "log"
         varied = self.source.vary.columns.get(key, ())
         if len(varied) > 1 and not self.source.vary.is_text(key):
             low, high = float(min(varied)), float(max(varied))
-            return low, high, "log" if low > 0 and high >= 8 * low else "linear"
-        field = self.first.parameters[key].field
-        least = 0.0 if field is None and value > 0 else -math.inf
-        bounds = {"gt": least, "ge": least, "lt": math.inf, "le": math.inf}
-        for rule in field.metadata if field else ():
-            bounds |= {name: float(getattr(rule, name)) for name in bounds if hasattr(rule, name)}
-        low, high = max(bounds["gt"], bounds["ge"]), min(bounds["lt"], bounds["le"])
+            return low, high, low > 0 and high >= 8 * low
+        low, high = bounds_of(self.first, key)
+        if self.first.parameters[key].field is None and value > 0:
+            low = 0.0
         if max(abs(low), abs(high)) < NO_BOUND:
             inset = 0.01 * (high - low)
-            return low + inset * (low == bounds["gt"]), high - inset * (high == bounds["lt"]), "linear"
+            return low + inset * (low != round(low, 12)), high - inset * (high != round(high, 12)), False
         if value == 0:
-            return (0.0 if low >= 0 else -1.0), 1.0, "linear"
+            return (0.0 if low >= 0 else -1.0), 1.0, False
         if value > 0 and low >= 0:
-            return value / FACTOR, min(FACTOR * value, high), "log"
-        return max(low, -BEYOND * abs(value)), min(BEYOND * abs(value), high), "linear"
+            return value / FACTOR, min(FACTOR * value, high), True
+        return max(low, -BEYOND * abs(value)), min(BEYOND * abs(value), high), False
 
-    def _at(self, question: Mapping[str, Any]) -> Case:
+    def _at(self, question: Question) -> Case:
         """The case with the values of a question. Raises `FpsolveError` where there is none."""
         values = question.get("values")
-        known = {each["key"] for each in self._knobs()}
+        known = {str(each["key"]) for each in self._knobs()}
         if not isinstance(values, dict) or not {*values} <= known:
             raise FpsolveError(f"got {values!r}; must be values by their keys, which are {', '.join(sorted(known))}")
         try:
             problem = self.first.at(values)
         except ValidationError as failure:
             ranges = {key.rpartition(".")[2]: each.field or UNBOUNDED for key, each in self.first.parameters.items()}
-            raise FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure, ranges))) from failure
+            raise refusal(failure, ranges) from failure
         except (TypeError, ValueError) as failure:
             raise FpsolveError(str(failure)) from failure
         if sentence := obstacle(self.first, values, self.case.p):
@@ -235,12 +231,12 @@ class Explorer:
             raise FpsolveError(message_of(found.failures[0].reason))
         return found
 
-    def _move(self, question: Mapping[str, Any]) -> Answer:
+    def _move(self, question: Question) -> Answer:
         """The numbers as fast as that goes."""
         case = self._at(question)
         return self._told(case, self._solved(case, is_moving=True))
 
-    def _solve(self, question: Mapping[str, Any]) -> Answer:
+    def _solve(self, question: Question) -> Answer:
         """All numbers, as `run` finds them."""
         case = self._at(question)
         found = self._solved(case)
@@ -250,10 +246,10 @@ class Explorer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
         equations = equations_of(case.system)
-        names = ("p", "value", "derivative", "error_estimate")
+        columns = moments.p, moments.value, moments.derivative, moments.error_estimate
         index, exponent = result.stability_index, result.lyapunov_exponent
         return {
-            "curve": [listed(getattr(moments, name)[order]) for name in names],
+            "curve": [listed(each[order]) for each in columns],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
             "equations": equations if len(equations) <= MOST_EQUATIONS else [],
@@ -262,7 +258,7 @@ class Explorer:
             "table": "",  # which nobody reads while a slider moves
         }
 
-    def _map(self, question: Mapping[str, Any]) -> Answer:
+    def _map(self, question: Question) -> Answer:
         """The lines on which stability ends; what there is of them so far, while they are traced."""
 
         def tell(found: Answer) -> None:
@@ -270,30 +266,27 @@ class Explorer:
 
         return map_of(self._at(question), question.get("axes"), tell)
 
-    def _paths(self, question: Mapping[str, Any]) -> Answer:
+    def _paths(self, question: Question) -> Answer:
         """Simulated paths, and the λ that they grow by."""
-        case, asked = self._at(question), (str(question.get("page")), "paths")
+        case = self._at(question)
         exponent = self._solved(case, is_moving=True).lyapunov_exponent
-        found = paths_of(case, partial(self._look, asked, question["number"]))
-        return {**found, "exponent": exponent.value if exponent else None}
+        return {**paths_of(case), "exponent": exponent.value if exponent else None}
 
-    def _save(self, question: Mapping[str, Any]) -> Answer:
+    def _save(self, question: Question) -> Answer:
         """A case of which `run` gives these numbers."""
         return {"name": f"{self.source.name}-explored.toml", "text": self._text(self._at(question))}
 
     def _text(self, case: Case) -> str:
-        held = self.source.problem.values
-        values = case.problem.values
-        changed = {key: value for key, value in values.items() if value != held[key] or key in self.source.vary.keys}
-        lists, p, names = dict[str, Any](), self.case.p.tolist(), self.source.output.names
+        changed = self._changed(case) | {key: case.problem.values[key] for key in self.source.vary.keys}
+        lists, p, names = dict[str, list[object]](), self.case.p.tolist(), self.source.output.names
         if p != self.source.p.tolist():
             lists["moments.p"] = p
         if names is not None and not {*self.quantities} <= {*names}:
-            lists["output.quantities"] = dict.fromkeys((*names, *self.quantities))
+            lists["output.quantities"] = [*dict.fromkeys((*names, *self.quantities))]
         without = "expect", "vary", "figure"
         return rewritten(self.source, self.source.path.parent, changed, without=without, lists=lists)
 
-    def _report(self, question: Mapping[str, Any]) -> Answer:
+    def _report(self, question: Question) -> Answer:
         """The report of these numbers."""
         started, case = datetime.now(UTC), self._at(question)
         found = self._solved(case)
@@ -310,19 +303,22 @@ class Explorer:
             )
         return {"name": f"{self.source.name}-explored.html", "text": page}
 
-    def _python(self, question: Mapping[str, Any]) -> Answer:
+    def _python(self, question: Question) -> Answer:
         """Python that computes these numbers."""
-        values, held = self._at(question).problem.values, self.source.problem.values
-        changed = {key: value for key, value in values.items() if value != held[key]}
         names = ["moment_lyapunov", *self._written[1:]]
         p, rtol = self.case.p.tolist(), self.case.rtol
         calls = [f"print({name}(problem, {f'{p}, ' * (name == names[0])}rtol={rtol}))" for name in names]
         lines = [
             f"from fpsolve import load_case, {', '.join(names)}",
             "",
-            f"problem = {self.code}.at({changed})",
+            f"problem = {self.code}.at({self._changed(self._at(question))})",
         ]
         return {"text": "\n".join([*lines, *calls, ""])}
+
+    def _changed(self, case: Case) -> dict[str, float | str]:
+        """The parameters with other values than in the file."""
+        held = self.source.problem.values
+        return {key: value for key, value in case.problem.values.items() if value != held[key]}
 
 
 def _letters(latex: str) -> str:
@@ -377,6 +373,5 @@ def explore(problem: Problem | Case | str | Path) -> Explored:
         return Explored(Explorer(problem, f"load_case({problem.path.name!r}).problem"))
     own, many = checked_problem(problem), Moments(p=tuple(USUAL_P.tolist()))
     moments = many if choose(own).is_function and choose(own).interval[0] < 0 else Moments(p=(2.0,))
-    make: Any = Case.model_construct  # the other sections are as where none is stated
-    case = make(title="", system=own.system, noise=own.noise, moments=moments)
-    return Explored(Explorer(case, "problem"))
+    case = Case.model_construct(title="", system=own.system, noise=own.noise, moments=moments)
+    return Explored(Explorer(case, "problem"))  # the other sections are as where none is stated

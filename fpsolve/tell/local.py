@@ -6,10 +6,10 @@ import json
 import socket
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
-from typing import Any
+from typing import TypeAlias
 
 FILES = {
     "": ("explore.html", "text/html; charset=utf-8"),
@@ -23,6 +23,10 @@ POLICY = (
     "form-action 'none'; frame-ancestors 'self' http://127.0.0.1:* http://localhost:*"
 )
 """What a browser lets the page do: nothing leaves it, and only pages of this machine may show it in a frame."""
+Json: TypeAlias = "bool | int | float | str | Sequence[Json] | Mapping[str, Json] | None"
+Answer = Mapping[str, Json]
+Question = Mapping[str, object]
+"""What JSON holds, unseen."""
 DIGITS = 5
 """Of the number of bytes of a question."""
 PAUSE = 0.1
@@ -44,12 +48,12 @@ class LocalPage(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, answer: Callable[[str, Mapping[str, Any], Callable[[], bool]], Mapping[str, Any]]) -> None:
+    def __init__(self, answer: Callable[[str, Question, Callable[[], bool]], Answer]) -> None:
         super().__init__(("127.0.0.1", 0), _Talk)
         self.answer, self.host = answer, f"127.0.0.1:{self.server_port}"
         self.address = f"http://{self.host}"
 
-    def get_request(self) -> Any:
+    def get_request(self) -> tuple[socket.socket, tuple[str, int]]:
         """A connection; without one, as where files run out, the next try is later."""
         try:
             return super().get_request()
@@ -57,7 +61,7 @@ class LocalPage(ThreadingHTTPServer):
             time.sleep(PAUSE)
             raise
 
-    def handle_error(self, request: Any, client_address: Any) -> None:
+    def handle_error(self, request: socket.socket | tuple[bytes, socket.socket], client_address: object) -> None:
         """Say nothing of a browser that has gone."""
         if not isinstance(sys.exception(), ConnectionError | TimeoutError):
             super().handle_error(request, client_address)
@@ -119,5 +123,5 @@ class _Talk(BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(content)
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, format: str, *args: object) -> None:
         """Nothing is printed of a question."""

@@ -119,8 +119,7 @@ def test_numbers_are_within_their_error_while_a_slider_moves(name, changes):
 
 
 @pytest.mark.parametrize("name", [pytest.param("strong", marks=pytest.mark.slow), "systems/telegraph"])
-def test_map_shows_its_grid_as_it_comes_and_ends_when_nobody_wants_it(name):
-    """Where the page asks for that, and where its connection is closed."""
+def test_map_shows_its_grid_as_it_comes_and_ends_where_the_page_asks_for_that(name):
     with page_of(name) as page, ThreadPoolExecutor() as pool:
         axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in [*page.knobs][-2:]]
         asked = pool.submit(page.told, "map", {}, axes=axes)
@@ -128,22 +127,39 @@ def test_map_shows_its_grid_as_it_comes_and_ends_when_nobody_wants_it(name):
         while "map" not in heard[-1] and not asked.done():
             heard.append(page.ask("listen", 3))
         assert any("unknowns" in each.get("waits", "") for each in heard)
-        assert page.ask("stop", 3, of="map").keys() <= {"seconds"}
+        assert page.ask("stop", 3).keys() <= {"seconds"}
         assert asked.result() == {"stopped": True}
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "is_told"),
+    [
+        ("systems/telegraph", "map", False),
+        ("systems/coupled_ou", "solve", False),
+        ("systems/coupled_ou", "solve", True),
+        pytest.param("strong", "map", True, marks=pytest.mark.slow),
+    ],
+)
+def test_page_that_is_closed_ends_what_it_waits_for(name, kind, is_told):
+    """By what it sends when it is closed, or as its connection is."""
+    with page_of(name) as page:
+        axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in [*page.knobs][-2:]]
         before, connection = threading.active_count(), http.client.HTTPConnection(page.host)
         own = {"Host": page.host, "Origin": page.shown.address, "Content-Type": "application/json"}
         values = {key: knob["value"] for key, knob in page.knobs.items()}
-        question = {"page": "b", "number": 1, "values": values, "axes": axes}
-        connection.request("POST", "/map", json.dumps(question), own)
-        other = Page(page.shown, "b")
-        while "waits" not in other.ask("listen"):
+        question = {"page": page.name, "number": 1, "values": values, "axes": axes}
+        connection.request("POST", f"/{kind}", json.dumps(question), own)
+        while "waits" not in page.ask("listen", 2):
             time.sleep(0.01)
+        if is_told:
+            page.ask("stop", 3)
+            assert json.loads(connection.getresponse().read()) == {"stopped": True}
         connection.close()
         for _ in range(1000):
             if threading.active_count() <= before:
                 return
             time.sleep(0.02)
-    pytest.fail("the map is still drawn")
+    pytest.fail("it is still solved")
 
 
 SIDE = {"key": "noise.D0", "start": 0.1, "stop": 1.0, "scale": "log"}
@@ -173,7 +189,7 @@ def test_bad_question_is_refused_with_the_sentences_of_cases(fig1, changed, ques
 
 def test_newer_question_of_a_page_ends_an_older_one_and_none_of_another_page(fig1):
     other = Page(fig1.shown, "b")
-    fig1.ask("stop", 10, of="curve")
+    fig1.ask("stop", 10)
     assert fig1.told("solve", {}, 9) == {"stopped": True}
     assert "curve" in other.told("move", {})
 
@@ -197,6 +213,18 @@ def test_sliders_go_as_far_as_the_case_or_the_parameter_says(fig1):
     assert ends["oscillator.omega"] == (0.1, 10.0, True)
     with page_of("chart") as page:
         assert page.knobs["oscillator.omega"]["ends"] == [0.3, 5.0]
+        assert page.ask("start")["axes"] == ["oscillator.omega", "noise.D0"]
+
+
+def test_pictures_name_the_unit_of_time_of_the_case(tmp_path):
+    text = (CASES / "fig1.toml").read_text(encoding="utf-8")
+    (tmp_path / "case.toml").write_text(f'{text}\n[units]\ntime = "s"\n', encoding="utf-8")
+    with page_of(tmp_path / "case.toml") as page:
+        start, field, paths = page.ask("start"), page.told("field", {}, p=1.0), page.told("paths", {})
+    assert (start["time"], start["unit"]) == ("time (s)", "1/s")
+    assert [each["names"][1] for each in field["panels"]] == ["noise ξ (1/s)"] * 2
+    assert field["panels"][1]["title"] == "stationary density (s/rad)"
+    assert "ln‖x‖/t (1/s)" in paths["told"]
 
 
 GOOD = json.dumps({"page": "a", "number": 1})
