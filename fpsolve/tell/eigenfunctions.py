@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
+from fpsolve.data import Quantity
 from fpsolve.drawing import MOST_LINES, QUARTERS, draw_colours, label_axes, styled
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.model.quantity import PHASE
+from fpsolve.exponent.method import DIRECTIONS
+from fpsolve.model.quantity import MOMENT, PHASE
 from fpsolve.results.nodes import FIELDS, Nodes
 from fpsolve.results.vtk import parameter_lines
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -49,7 +53,9 @@ class Picture:
         return self.png
 
 
-def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "viridis") -> Picture:
+def draw_eigenfunction(
+    pair: PrincipalPair, field: Field = "T", *, cmap: str = "viridis", time_unit: str = "time"
+) -> Picture:
     """Draw an eigenfunction, or the tilted density, over phase and noise; for noise with states a line for each.
 
     Of more than two variables over directions, see `analysis.DirectionDensity`, as the functions of the pair have it: T
@@ -59,6 +65,7 @@ def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "
         pair: the eigenpair.
         field: "T", "T_adjoint", or their product "tilted_density".
         cmap: the colours, by matplotlib's names.
+        time_unit: what the unit of time is called, such as "s".
 
     Raises:
         ValueError: there is no such field.
@@ -69,53 +76,54 @@ def draw_eigenfunction(pair: PrincipalPair, field: Field = "T", *, cmap: str = "
     from matplotlib.figure import Figure
 
     problem, content = pair.generator.problem, BytesIO()
-    draw = DRAWN[choose(problem).pictures.part]
+    known = {key: each._replace(quantity=each.quantity.timed(time_unit)) for key, each in problem.parameters.items()}
     with styled():
         figure = Figure(layout="constrained")  # which belongs to no window
         axes = figure.add_subplot()
-        draw(pair, field, cmap, axes)
-        figure.suptitle(f"p = {pair.p:g}, Λ(p) = {round(pair.value, 14) + 0.0:.6g} (1/time)", parse_math=False)
-        axes.set_title("\n".join(parameter_lines(problem.parameters)), fontsize=9, parse_math=False)
-    figure.savefig(content, format="png", dpi=150)
+        if choose(problem).pictures == DIRECTIONS:
+            found = on_nodes(pair)
+            values = found.fields._asdict()[field]
+            found.grid.draw(axes, values, _about(field, found.grid, time_unit).attributes, cmap=cmap)
+        else:
+            _draw_over_noise(pair, field, cmap, time_unit, axes)
+        number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g}"
+        figure.suptitle(f"{number} ({MOMENT.timed(time_unit).unit})", parse_math=False)
+        axes.set_title("\n".join(parameter_lines(known)), fontsize=9, parse_math=False)
+        figure.savefig(content, format="png", dpi=150)
     return Picture(content.getvalue())
 
 
-def _about(field: str, grid: Grid) -> dict[str, str]:
-    """long_name, symbol and units of a function; densities have the unit of a grid."""
+def _about(field: str, grid: Grid, time_unit: str) -> Quantity:
+    """A function; densities have the unit of a grid."""
     quantity = FIELDS[field]
-    return {**quantity.attributes, "units": quantity.unit if field == "T" else grid.unit}
+    return replace(quantity, unit=quantity.unit if field == "T" else grid.unit).timed(time_unit)
 
 
-def _draw_over_directions(pair: PrincipalPair, field: str, cmap: str, axes: Any) -> None:
-    """A function of directions in colours."""
-    found = on_nodes(pair)
-    found.grid.draw(axes, getattr(found.fields, field), _about(field, found.grid), cmap=cmap)
-
-
-def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, axes: Any) -> None:
+def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, time_unit: str, axes: Axes) -> None:
     """A function of phase and noise where it is not negligible, in colours, or as a line for each state of the noise.
 
     The scale begins at 0 where the least value is next to it, or all are the same.
     """
     from matplotlib.colors import LogNorm, Normalize
 
-    nodes, about = Nodes.of(pair, FINER).seen(pair), _about(field, Grid.of(pair))
-    values = nodes.at_xi(getattr(nodes.fields(pair), field))
+    nodes, about = Nodes.of(pair, FINER).seen(pair), _about(field, Grid.of(pair), time_unit)
+    values = nodes.at_xi(nodes.fields(pair)._asdict()[field])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     is_log = field == "T" and 0 < 10**DECADES * low < high
     if nodes.is_lines:
         _draw_lines(axes, nodes, values, is_log=is_log)
     else:
         is_next = abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high
-        norm = LogNorm(low, high) if is_log else Normalize(0.0 if is_next else low, high)
-        draw_colours(axes, nodes.phi.ravel(), nodes.xi, values.T, about, shading="gouraud", cmap=cmap, norm=norm)
+        look = {"cmap": cmap, "norm": LogNorm(low, high) if is_log else Normalize(0.0 if is_next else low, high)}
+        draw_colours(axes, nodes.phi.ravel(), nodes.xi, values.T, about.attributes, shading="gouraud", **look)
     for impact in nodes.impacts:
         axes.axvline(impact, color=RED, linewidth=1.2)
     axes.set_xticks(*QUARTERS)
-    label_axes(axes, PHASE.attributes, about if nodes.is_lines else pair.generator.problem.noise_quantity.attributes)
+    noise = pair.generator.problem.noise_quantity.timed(time_unit)
+    label_axes(axes, PHASE.attributes, (about if nodes.is_lines else noise).attributes)
 
 
-def _draw_lines(axes: Any, nodes: Nodes, values: FloatArray, *, is_log: bool) -> None:
+def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -> None:
     """A line over φ for each value of the noise, with a gap where the function jumps."""
     phi = np.pad(nodes.phi, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
     for number, xi in enumerate(nodes.xi):
@@ -129,7 +137,3 @@ def _draw_lines(axes: Any, nodes: Nodes, values: FloatArray, *, is_log: bool) ->
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     if 1 < nodes.xi.size <= MOST_LINES:
         axes.legend()
-
-
-DRAWN = {PHASE_AND_NOISE.part: _draw_over_noise, DIRECTIONS.part: _draw_over_directions}
-"""What draws each of the `Pictures`."""

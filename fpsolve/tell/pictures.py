@@ -156,7 +156,7 @@ def _of_eigenfunctions(
 
 
 def _draw_eigenfunction(case: Case, curve: Curve, p: float, paths: Sequence[Path], heading: str) -> None:
-    picture = draw_eigenfunction(Numerics.of(case).solver(curve.problem).pair(p))
+    picture = draw_eigenfunction(Numerics.of(case).solver(curve.problem).pair(p), time_unit=case.units.time)
     for path in paths:
         picture.save(path)
 
