@@ -9,7 +9,7 @@ from fpsolve.data import short_names, written
 from fpsolve.exponent.error import digits
 from fpsolve.solve.check import Comparison
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
-from fpsolve.tell.limits import EACH, ROWS
+from fpsolve.tell.text import EACH, ROWS
 
 
 def show(case: Case, comparisons: Sequence[Comparison]) -> Iterator[Block]:

@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from operator import methodcaller
-from typing import Any, NamedTuple
+from types import MappingProxyType
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case
+from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS
 from fpsolve.data import short_names, written
-from fpsolve.exponent.error import Estimate
-from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult, Status
 from fpsolve.solve.intervals import spreads_of
-from fpsolve.tell.blocks import Block, Column, Grid, Sentence
-from fpsolve.tell.limits import EACH, EXTREMES, FAILURES, MOMENTS, ROWS
+from fpsolve.tell.blocks import Block, Column, Grid, Sentence, filled
 from fpsolve.tell.numbers import STAR, bounds_text, index_text, told_indices
-from fpsolve.tell.text import DIGITS, interval, short, units_in_words
+from fpsolve.tell.text import (
+    DIGITS,
+    EACH,
+    EXTREMES,
+    FAILURES,
+    MOMENTS,
+    ROWS,
+    error_text,
+    interval,
+    short,
+    units_in_words,
+)
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
 """The indices that come first, and that have a column over a parameter."""
@@ -34,19 +42,16 @@ THEORY = "Eqs. (38)-(39): perturbation theory"
 """The remark on the columns of closed forms."""
 
 
-class Shown(NamedTuple):
-    """What a column shows of each curve.
+class _OfCurve(Protocol):
+    """What was found of a curve."""
 
-    Attributes:
-        column: its place.
-        text: what stands there, also where there is no number.
-        numbers: those of all curves, of which the extreme ones are sought, NaN where there is none; None for the
-            other columns.
-    """
+    @property
+    def curve(self) -> Curve: ...
 
-    column: Column
-    text: Callable[[Any], str]
-    numbers: FloatArray | None = None
+
+F = TypeVar("F", bound=_OfCurve)
+Cells = Iterable[tuple[Column, str]]
+"""Columns, each with what stands there of one curve."""
 
 
 def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Block]:
@@ -54,7 +59,7 @@ def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[B
     yield curve_grid(case, results, table)
     if len(results) <= EACH:
         return
-    counts = Counter(_status(table))
+    counts = Counter(result.status for result in results)
     failed, whole = sum(count for each, count in counts.items() if each.fails), counts[Status.CONVERGED]
     kinds = {"converged": whole, "with warnings": counts.total() - whole - failed, "not converged": failed}
     states = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
@@ -69,110 +74,97 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
     Args:
         table: the numbers of all curves.
     """
-    shown, status = list(_quantities(case, table)), _status(table)
-    if any(status):
-        shown.append(Shown(Column("status"), lambda result: result.status.word))
-    grid = grid_of(case, results, shown, [place for place, each in enumerate(status) if each.fails])
+    status = table[STATUS.name].values
+    known, told = ~np.isnan(status), told_indices(case)
+    indices = {each.symbol: table[each.name].values for each in told}
+    numbers = {each.symbol: indices[each.symbol] for each in told if each in MAIN}
+    for p in _told_moments(case):
+        numbers[moment_at(p).symbol] = table[MOMENT.name].values[:, np.flatnonzero(case.p == p)[0]]
+    numbers |= indices
+    extreme = {symbol: numbers[symbol][known] for symbol in [*numbers][:EXTREMES]}
+    failed = [place for place, result in enumerate(results) if result.status.fails]
+    has_status = any(status[known])
+
+    def cells(result: CurveResult) -> Cells:
+        yield from _numbers(case, result)
+        yield Column("status"), result.status.word if has_status else ""
+
+    grid = grid_of(case, results, cells, extreme, failed)
     headings = [each.heading for each in grid.columns]
-    numbers = [each for each in (*told_indices(case), MEAN_SQUARE) if each.symbol in headings]
-    units, theories = units_in_words(case.units.time, numbers), [each for each in headings if each.startswith("Eq.")]
-    told = [", ".join(f"{each.symbol}: {each.words}" for each in numbers)] + [units] * bool(units)
-    told += [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories)
-    return replace(grid, title="", remark="; ".join(told))
+    quantities = [each for each in (*told, MEAN_SQUARE) if each.symbol in headings]
+    theories = [each for each in headings if each.startswith("Eq.")]
+    remarks = [", ".join(f"{each.symbol}: {each.words}" for each in quantities)]
+    remarks += [units_in_words(case.units.time, quantities)]
+    remarks += [THEORY] * bool(theories) + [STAR] * any("*" in each for each in theories)
+    return replace(grid, title="", remark="; ".join(filter(None, remarks)))
 
 
-def grid_of(case: Case, found: Sequence[Any], shown: Iterable[Shown], failed: Sequence[int] = ()) -> Grid:
-    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first `failed` ones."""
-    shown = [each for each in shown if each.numbers is not None or any(map(each.text, found))]
-    is_digest = len(found) > ROWS
-    chosen = _chosen(found, shown, failed) if is_digest else [(each, "") for each in found]
-    columns = [Column(name) for name in short_names(case.vary.keys)] + [each.column for each in shown]
-    grid = Grid(case.headline, columns + [Column("which", is_text=True)] * is_digest)
-    for each, which in chosen:
-        texts = [column.text(each) for column in shown]
-        grid.rows.append([*map(written, each.curve.varied.values()), *texts, *[which] * is_digest])
-    return grid
+def grid_of(
+    case: Case,
+    found: Sequence[F],
+    cells: Callable[[F], Cells],
+    numbers: Mapping[str, FloatArray] = MappingProxyType({}),
+    failed: Sequence[int] = (),
+) -> Grid:
+    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first `failed` ones.
+
+    Args:
+        cells: of one curve.
+        numbers: by their headings those of all curves whose extreme ones are sought, NaN where there is none.
+        failed: the places of the curves that failed.
+    """
+    if len(found) <= ROWS:
+        reasons: dict[int, list[str]] = {place: [] for place in range(len(found))}
+    else:
+        reasons = {place: [] for place in failed[:FAILURES]}
+        for heading, values in numbers.items():
+            if np.isfinite(values).any():
+                for word, most in (("least", np.nanargmin), ("largest", np.nanargmax)):
+                    reasons.setdefault(int(most(values)), []).append(f"{word} {heading}")
+    keys, which, rows = [*map(Column, short_names(case.vary.keys))], Column("which", is_text=True), []
+    for place, told in sorted(reasons.items()):
+        varied = [written(each) for each in found[place].curve.varied.values()]
+        rows.append([*zip(keys, varied, strict=True), *cells(found[place]), (which, ", ".join(told))])
+    columns = [column for column, _ in rows[0]] if rows else []
+    return filled(case.headline, columns, [[text for _, text in row] for row in rows])
 
 
-def _chosen(found: Sequence[Any], shown: Sequence[Shown], failed: Sequence[int]) -> list[tuple[Any, str]]:
-    """What has the extreme values of the first quantities, and some that failed, each with the reason."""
-    reasons: dict[int, list[str]] = {place: [] for place in failed[:FAILURES]}
-    for column, _, numbers in [each for each in shown if each.numbers is not None][:EXTREMES]:
-        if numbers is not None and np.isfinite(numbers).any():
-            for word, place in (("least", np.nanargmin(numbers)), ("largest", np.nanargmax(numbers))):
-                reasons.setdefault(int(place), []).append(f"{word} {column.heading}")
-    return [(found[place], ", ".join(told)) for place, told in sorted(reasons.items())]
-
-
-def _status(table: Table) -> list[Status]:
-    """Of all curves that are known."""
-    values = table[STATUS.name].values
-    return [Status(int(each)) for each in values[~np.isnan(values)].tolist()]
-
-
-def _quantities(case: Case, table: Table) -> Iterator[Shown]:
-    """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the other indices."""
-    known = ~np.isnan(table[STATUS.name].values)
-    over_p, told = case.figure.x == "p", told_indices(case)
-    for index in [each for each in told if each in MAIN]:
-        yield Shown(Column(index.symbol), partial(_index, index), table[index.name].values[known])
-        yield Shown(
-            Column(f"± {index.symbol}", 3 if index == STABILITY_INDEX else 1),
-            partial(_error, partial(_estimate, index)),
-        )
-        if case.uncertain and index.name in UNCERTAIN:
-            yield Shown(Column(f"{LEVEL:.0%} of {index.symbol}", 1), partial(_interval, case, index.name))
-        if not over_p:
-            heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
-            yield Shown(Column(heading, 2), partial(_theory, index))
+def _told_moments(case: Case) -> list[float]:
+    """The p whose Λ(p) has a column: all of few, or else 2; where no index is told the first and the last one."""
     p = [float(each) for each in case.p if each] if MOMENT.name in case.asked else []
     if len(p) > MOMENTS:
-        p = [2.0] if 2.0 in p else [] if told else [p[0], p[-1]]
-    for each in p:
-        of, about, rank = methodcaller("moment", each), moment_at(each), (1 + (each != 2)) * bool(told)
-        values = table[MOMENT.name].values[known][:, np.flatnonzero(case.p == each)[0]]
-        yield Shown(Column(about.symbol, rank), partial(_number, of), values)
-        yield Shown(Column(f"± {about.symbol}", 3), partial(_error, of))
+        p = [2.0] if 2.0 in p else [] if told_indices(case) else [p[0], p[-1]]
+    return p
+
+
+def _numbers(case: Case, result: CurveResult) -> Cells:
+    """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the other indices."""
+    over_p, told, spreads = case.figure.x == "p", told_indices(case), spreads_of(case, result).indices
+    texts = {each: index_text(each, result, DIGITS) for each in told}
+    if result.status.fails:
+        texts |= {each: "" for each in told if result.estimates[each.name] is None}
+    for index in [each for each in told if each in MAIN]:
+        yield Column(index.symbol), texts[index]
+        is_second = index == STABILITY_INDEX
+        yield Column(f"± {index.symbol}", 3 if is_second else 1), error_text(result.estimates[index.name])
+        if case.uncertain and index.name in UNCERTAIN:
+            spread = spreads.get(index.name)
+            yield Column(f"{LEVEL:.0%} of {index.symbol}", 1), interval(spread.low, spread.high) if spread else ""
+        if not over_p:
+            value = index.theory(result.curve.problem) if result.curve.is_possible else math.nan
+            heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
+            yield Column(heading, 2), "" if math.isnan(value) else f"{value:.6g}"
+    for p in _told_moments(case):
+        estimate, symbol = result.moment(p), moment_at(p).symbol
+        yield Column(symbol, (1 + (p != 2)) * bool(told)), short(estimate) if estimate else ""
+        yield Column(f"± {symbol}", 3), error_text(estimate)
     for rank, index in enumerate([each for each in told if each not in MAIN and over_p], 4):
-        yield Shown(Column(index.symbol, rank), partial(_index, index), table[index.name].values[known])
+        yield Column(index.symbol, rank), texts[index]
     if EXCURSIONS in case.asked:
         level = min(case.excursions.levels, key=lambda each: abs(math.log(each / 10)))
-        yield Shown(
-            Column(f"P(sup ‖x‖ ≥ {level:g})", 1),
-            lambda result: bounds_text(result.excursion, level) if result.excursion else "",
-        )
+        bounds = bounds_text(result.excursion, level) if result.excursion else ""
+        yield Column(f"P(sup ‖x‖ ≥ {level:g})", 1), bounds
     if case.has_response:
         means = case.problem.linear.response.means
         for name in {"amplitude_squared"} & means.keys() or means:
-            yield Shown(Column(means[name].symbol, 1), partial(_mean, name))
-
-
-def _index(index: Index, result: CurveResult) -> str:
-    is_lost = result.estimates[index.name] is None and result.status.fails
-    return "" if is_lost else index_text(index, result, DIGITS)
-
-
-def _estimate(index: Index, result: CurveResult) -> Estimate | None:
-    return result.estimates[index.name]
-
-
-def _number(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
-    return short(found) if (found := of(result)) else ""
-
-
-def _error(of: Callable[[Any], Estimate | None], result: CurveResult) -> str:
-    return f"{found.error_estimate:.0e}" if (found := of(result)) else ""
-
-
-def _mean(name: str, result: CurveResult) -> str:
-    return short(result.response.means[name]) if result.response else ""
-
-
-def _interval(case: Case, name: str, result: CurveResult) -> str:
-    spread = spreads_of(case, result).indices.get(name)
-    return "" if spread is None else interval(spread.low, spread.high)
-
-
-def _theory(index: Index, result: CurveResult) -> str:
-    value = index.theory(result.curve.problem) if result.curve.is_possible else math.nan
-    return "" if math.isnan(value) else f"{value:.6g}"
+            yield Column(means[name].symbol, 1), short(result.response.means[name]) if result.response else ""

@@ -13,7 +13,7 @@ from fpsolve.exponent.quantities import STABILITY_INDEX
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.tell.blocks import WORDS, Note
-from fpsolve.tell.limits import EACH, NAMED, NOTES
+from fpsolve.tell.text import EACH, NAMED, NOTES
 
 SUMMARY = "summary.json"
 """The file of all messages of a run."""

@@ -9,7 +9,7 @@ from fpsolve.case.case import Case
 from fpsolve.data import written
 from fpsolve.model.problem import Problem
 from fpsolve.tell.blocks import Block, Column, Sentence, filled
-from fpsolve.tell.limits import EACH
+from fpsolve.tell.text import EACH
 
 
 def show(case: Case) -> Iterator[Block]:

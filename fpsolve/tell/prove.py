@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
-from functools import partial
 
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
@@ -14,8 +13,8 @@ from fpsolve.proofs.claims import plain, verdicts
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.solve.prove import CurveProof
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
-from fpsolve.tell.curves import Shown, grid_of
-from fpsolve.tell.limits import EACH, PROOFS, ROWS
+from fpsolve.tell.curves import Cells, grid_of
+from fpsolve.tell.text import EACH, PROOFS, ROWS
 
 NOT_PROVEN = "not proven"
 """The word where no bound is proven."""
@@ -64,23 +63,19 @@ def proof_grid(proof: CurveProof) -> Grid:
 
 def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
     """How many Λ(p) are proven of each curve, the bounds on λ, and what becomes of paths and moments."""
-    p, symbol = [p for p, _ in proofs[0].moments], LYAPUNOV_EXPONENT.symbol
 
-    def proven(proof: CurveProof) -> str:
-        return f"{sum(found is not None and found.is_proven for _, found in proof.moments)} of {len(p)}"
+    def cells(proof: CurveProof) -> Cells:
+        count = sum(found is not None and found.is_proven for _, found in proof.moments)
+        yield Column("proven"), f"{count} of {len(proof.moments)}"
+        path = proof.exponent
+        yield Column(LYAPUNOV_EXPONENT.symbol, 1), _between(path) if path else ""
+        yield Column("paths", 2), FATES[path.sign] if path else ""
+        if len(proof.moments) > PROOFS:
+            yield Column("moments", 3), _counted(proof)
+        else:
+            yield from ((Column(f"p = {_order(p)}", 3), _fate(p, found)) for p, found in proof.moments)
 
-    def fate(i: int, proof: CurveProof) -> str:
-        return _fate(*proof.moments[i])
-
-    shown = [
-        Shown(Column("proven"), proven),
-        Shown(Column(symbol, 1), lambda each: _between(each.exponent) if each.exponent else ""),
-        Shown(Column("paths", 2), lambda each: FATES[each.exponent.sign] if each.exponent else ""),
-    ]
-    each_p = [Shown(Column(f"p = {_order(each)}", 3), partial(fate, i)) for i, each in enumerate(p)]
-    return grid_of(
-        case, proofs[:ROWS], shown + (each_p if len(p) <= PROOFS else [Shown(Column("moments", 3), _counted)])
-    )
+    return grid_of(case, proofs[:ROWS], cells)
 
 
 def _fate(p: float, found: Enclosure | None) -> str:

@@ -16,10 +16,9 @@ from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.model.quantity import OF_STOPS
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.tell.blocks import Block, Column, Drawing, Grid, Sentence, filled
-from fpsolve.tell.curves import Shown, grid_of
-from fpsolve.tell.limits import EACH, PICTURES
+from fpsolve.tell.curves import Cells, grid_of
 from fpsolve.tell.notes import MONTE_CARLO
-from fpsolve.tell.text import fate, sampled, sign_of, units_in_words
+from fpsolve.tell.text import EACH, PICTURES, fate, sampled, sign_of, units_in_words
 
 SURE = 3
 """Standard errors from 0 at which a simulated sign is told."""
@@ -102,15 +101,16 @@ def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
 def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[int, CurveResult]) -> Grid:
     """λ of each curve by both methods."""
 
-    def cell(i: int, each: SimulatedCurve) -> str:
+    def cells(each: SimulatedCurve) -> Cells:
         result, found = solved.get(each.curve.number), each.result
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
-        return _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known)[i]
+        return zip(columns, _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known), strict=True)
 
-    columns = [Column(LYAPUNOV_EXPONENT.symbol), Column("± s.e."), *COMPARED]
-    shown = [Shown(column, partial(cell, i)) for i, column in enumerate(columns)]
-    shown[0] = shown[0]._replace(numbers=np.array([each.result.lyapunov_exponent for each in simulated]))
-    return replace(grid_of(case, simulated, shown), remark=units_in_words(case.units.time, [LYAPUNOV_EXPONENT]))
+    symbol = LYAPUNOV_EXPONENT.symbol
+    columns = Column(symbol), Column("± s.e."), *COMPARED
+    numbers = {symbol: np.array([each.result.lyapunov_exponent for each in simulated])}
+    remark = units_in_words(case.units.time, [LYAPUNOV_EXPONENT])
+    return replace(grid_of(case, simulated, cells, numbers), remark=remark)
 
 
 def _cells(value: float | None, error: float | None, known: float | None) -> list[str]:

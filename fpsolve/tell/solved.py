@@ -13,10 +13,9 @@ from fpsolve.solve.questions import BY_NAME
 from fpsolve.tell import curves
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
-from fpsolve.tell.limits import EACH, PICTURES, ROWS_OVER_P
 from fpsolve.tell.numbers import OF_CURVE, moment_grid
 from fpsolve.tell.pictures import FIGURES
-from fpsolve.tell.text import duration, plural
+from fpsolve.tell.text import EACH, PICTURES, ROWS_OVER_P, duration, plural
 from fpsolve.tell.verdict import meaning, verdicts
 
 

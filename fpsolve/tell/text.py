@@ -1,4 +1,9 @@
-"""Numbers, units, counts and times as text."""
+"""Numbers, units, counts and times as text, and how much is shown of one, of several and of many curves.
+
+Several curves have a row each in one table, up to `ROWS`; of more the extreme ones and some that failed have one. Up
+to `EACH` curves are also described one by one, on a terminal where that is asked for: a table, sentences, and of the
+first `PICTURES` pictures. Where the figure is over a parameter, curves have a row each from the first one on.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +14,26 @@ from fpsolve.data import Quantity
 from fpsolve.exponent.error import Estimate, digits
 from fpsolve.tell.blocks import Column
 
+EACH = 10
+"""Curves that are described one by one."""
+PICTURES = 3
+"""Curves that have pictures of their own in a report."""
+ROWS = 50
+"""Curves, or values that are expected, that have a row each."""
+EXTREMES = 2
+"""Quantities whose extreme curves have a row."""
+FAILURES = 20
+"""Failed curves among many that have a row."""
+MOMENTS = 3
+"""The p whose Λ has a column beside that of other quantities."""
+ROWS_OVER_P = 12
+"""Λ(p) of a single curve that a terminal shows unasked."""
+PROOFS = 4
+"""Proven moments of which each is told."""
+NAMED = 3
+"""Curves that are named of those that share a note."""
+NOTES = 20
+"""Notes of each severity."""
 DIGITS = 7
 """Digits of a number in a sentence, or in a table of many curves."""
 NUMBER_COLUMNS = (
@@ -22,11 +47,16 @@ def short(estimate: Estimate) -> str:
     return digits(estimate.value, estimate.error_estimate, DIGITS)
 
 
+def error_text(found: Estimate | None) -> str:
+    """The estimate of an error with one digit; empty where there is no number."""
+    return f"{found.error_estimate:.0e}" if found else ""
+
+
 def row_of(about: Quantity, found: Estimate | None, time_unit: str) -> list[str]:
     """A row of a table with `NUMBER_COLUMNS`."""
     unit = about.timed(time_unit).unit
-    numbers = [digits(found.value, found.error_estimate), f"{found.error_estimate:.0e}"] if found else ["", ""]
-    return [about.words, about.symbol, *numbers, "" if unit in ("1", "unknown") else unit]
+    value = digits(found.value, found.error_estimate) if found else ""
+    return [about.words, about.symbol, value, error_text(found), "" if unit in ("1", "unknown") else unit]
 
 
 def sampled(value: float, error: float) -> str:

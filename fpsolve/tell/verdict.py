@@ -15,8 +15,7 @@ from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.intervals import spreads_of
 from fpsolve.tell.blocks import Sentence
-from fpsolve.tell.limits import EACH
-from fpsolve.tell.text import fate, likely, short, sign_of
+from fpsolve.tell.text import EACH, fate, likely, short, sign_of
 
 PATH, SQUARE = "almost every path", "the mean square"
 """What λ and Λ(2) tell of."""
