@@ -7,9 +7,10 @@ from functools import partial
 from pathlib import Path
 from string import ascii_lowercase
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import Region, Regions
@@ -22,18 +23,17 @@ from fpsolve.tell.blocks import Block, Column, Drawing, Grid, Sentence
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.text import plural
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
 """Of regions, the darker the more of the quantities grow there."""
 UNKNOWN = "#C4C8CE"
 """Of the rest of a frame."""
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
-LETTER = 0.0125, 0.055
+LETTER = 0.014, 0.06
 """Width and height of a letter of a name, with what is free around it, in sides of the frame."""
-CLOSED_FORM: dict[str, Any] = {"linestyle": (0, (2, 3)), "linewidth": 1.4, "zorder": 3}
-"""The look of a closed form."""
-FORM = Format(height=4.0)
-"""The size of a figure."""
 SPECIAL = {"fold": ("fold", "^"), "crossing": ("crossing", "o"), "at ": ("value asked for", "s")}
 """Beginnings of labels, what the legend calls such points, and their markers."""
 
@@ -45,69 +45,67 @@ def chart_figure(case: Case, chart: Chart) -> Drawing:
 
 
 def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None:
-    """The lines, their closed forms dashed, and the regions with names."""
+    """The lines, their closed forms dotted, and the regions with names."""
     frame = charted(case).x, charted(case).y
-    keys = frame[0].key, frame[1].key
-    held = case.curve({}).held(case.units.time, keys)
-    with figure_for(paths, heading, held, FORM) as figure:
+    keys = [side.key for side in frame]
+    with figure_for(paths, heading, case.curve({}).held(case.units.time, keys), Format(height=4.0)) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
+        marked = set[str]()
         for i, line in enumerate(chart.lines):
-            colour, bifurcation = f"C{i}", appears(line.target)
             for branch in line.branches:
-                axes.plot(*branch.path, color=colour)
+                axes.plot(*branch.path, color=f"C{i}")
                 for start, (_, marker) in SPECIAL.items():
                     chosen = np.array([start in label for label in branch.labels])
-                    axes.plot(branch.x[chosen], branch.y[chosen], marker, color=colour, markerfacecolor="white")
+                    axes.plot(branch.x[chosen], branch.y[chosen], marker, color=f"C{i}", markerfacecolor="white")
+                    marked |= {start} if chosen.any() else set()
             if line.branches:
-                name = f"{line.target.latex}: {bifurcation}" if bifurcation else line.target.latex
-                axes.plot([], [], color=colour, label=name)
+                words = ": ".join(filter(None, (line.target.latex, appears(line.target))))
+                axes.plot([], [], color=f"C{i}", label=words)
             for points in chart.closed_forms[i]:
-                axes.plot(points[:, 0], points[:, 1], color=colour, **CLOSED_FORM)
+                axes.plot(*points.T, ":", color=f"C{i}", zorder=3)
         if any(chart.closed_forms):
-            words = "closed form, Eqs. (38)-(39), in the colour of its line"
-            axes.plot([], [], label=words, color="0.35", **CLOSED_FORM)
-        labels = [label for line in chart.lines for branch in line.branches for label in branch.labels]
-        for start, (name, marker) in SPECIAL.items():
-            if any(start in label for label in labels):
-                axes.plot([], [], marker, label=name, color="0.35", markerfacecolor="none")
+            axes.plot([], [], ":", color="0.35", label="closed form, Eqs. (38)-(39), in the colour of its line")
+        for name, marker in (SPECIAL[start] for start in SPECIAL if start in marked):
+            axes.plot([], [], marker, label=name, color="0.35", markerfacecolor="none")
         for name, letter in small.items():
             axes.plot([], [], " ", label=f"{letter}: {name}")
 
 
-def _shade(axes: Any, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
+def _shade(axes: Axes, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
     """Draw a tint for each region, and its name, or where that has no room a letter; these by the names."""
-    from matplotlib.colors import to_rgb
+    from matplotlib.colors import ListedColormap
 
     x, y = frame
-    edges, small = np.linspace(0, 1, regions.index.shape[0] + 1), dict[str, str]()
+    edges, letters, small = np.linspace(0, 1, len(regions.index) + 1), iter(ascii_lowercase), dict[str, str]()
     unstable = (sum(sign > 0 for sign in each.signs.values()) for each in regions.each)
     tints = [TINTS[min(count, len(TINTS) - 1)] for count in unstable]
-    colours = np.array([*map(to_rgb, (*tints, UNKNOWN))])[regions.index]  # -1 is the last one
-    axes.pcolormesh(x.value(edges), y.value(edges), np.swapaxes(colours, 0, 1), rasterized=True)
+    mesh = axes.pcolormesh(x.value(edges), y.value(edges), regions.index.T, rasterized=True)
+    mesh.set(cmap=ListedColormap([UNKNOWN, *tints]), clim=(-1.5, len(tints) - 0.5))
     if (regions.index < 0).any():
         axes.fill([], [], color=UNKNOWN, label="not solved, or not defined")
-    letters = iter(ascii_lowercase)
     for number, (each, tint) in enumerate(zip(regions.each, tints, strict=True)):
-        box = {"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85}  # closed forms may cross the words
-        middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "0.15", "zorder": 4, "bbox": box}
         name = each.name.replace("δ_p", r"$\delta_p$")
-        parts, size = name.split(", "), np.array(regions.index.shape)
-        for lines in (parts, [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]):
-            half = 0.5 * np.array([max(map(len, lines)) * LETTER[0], len(lines) * LETTER[1]])
-            (left, low), (right, high) = (np.floor((each.at + end * half) * size).astype(int) for end in (-1, 1))
-            covered = regions.index[left : right + 1, low : high + 1]
-            if min(left, low) >= 0 and right < size[0] and high < size[1] and (covered == number).all():
-                words, height = "\n".join(lines), 9.5
-                break
-        else:
-            words, height = rf"$\mathbf{{{next(letters, 'z')}}}$" if each.share > NAMED else "", 12.0
-            small |= {name: words} if words else {}
-        axes.text(x.value(each.at[0]), y.value(each.at[1]), words, fontsize=height, **middle)
+        parts = name.split(", ")
+        folded = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
+        fitting = ("\n".join(lines) for lines in (parts, folded) if _has_room(regions.index == number, each.at, lines))
+        if not (words := next(fitting, "")) and each.share > NAMED:
+            words = small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
+        text = axes.text(x.value(each.at[0]), y.value(each.at[1]), words, fontsize="small", ha="center", va="center")
+        text.set(color="0.15", zorder=4)
+        text.set_bbox({"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85})  # over closed forms
     return small
+
+
+def _has_room(inside: NDArray[np.bool_], at: tuple[float, float], lines: Sequence[str]) -> bool:
+    """Whether lines of letters around a place of the frame are inside of a region."""
+    half = 0.5 * np.array([max(map(len, lines)) * LETTER[0], len(lines) * LETTER[1]])
+    (left, low), (right, high) = (np.floor((np.array(at) + end * half) * inside.shape).astype(int) for end in (-1, 1))
+    is_framed = min(left, low) >= 0 and right < inside.shape[0] and high < inside.shape[1]
+    return bool(is_framed and inside[left : right + 1, low : high + 1].all())
 
 
 def show(case: Case, chart: Chart) -> Iterator[Block]:
@@ -143,18 +141,19 @@ def chart_grid(case: Case, chart: Chart) -> Grid:
 
 def region_meaning(region: Region, targets: Iterable[Target]) -> str:
     """What becomes in a region of a chart: "Almost every path decays and the mean square grows."."""
-    told, signs = list[str](), set[int]()
+    told = dict[str, int]()
     for target in sorted(targets, key=lambda each: (each.kind == "moment", each.p)):
         sign = region.signs.get(str(target), 0)
         if sign and target.kind != "stability_index" and not target.level:
             moment = "the mean square" if target.p == 2 else f"E‖x‖^{target.p:g}"
-            told.append(
-                f"{moment if target.kind == 'moment' else 'almost every path'} {'grows' if sign > 0 else 'decays'}"
-            )
-            signs.add(sign)
-    carried = ", which rare paths carry" if len(signs) == 2 and told[0].endswith("path decays") else ""
-    text = " and ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
-    return f" {text[0].upper()}{text[1:]}{carried}." if told else ""
+            what = moment if target.kind == "moment" else "almost every path"
+            told[f"{what} {'grows' if sign > 0 else 'decays'}"] = sign
+    if not told:
+        return ""
+    *others, last = told
+    text = " and ".join(filter(None, (", ".join(others), last)))
+    carried = ", which rare paths carry" if {*told.values()} == {-1, 1} and "almost every path decays" in told else ""
+    return f" {text[0].upper()}{text[1:]}{carried}."
 
 
 def traced(chart: Chart) -> str:
