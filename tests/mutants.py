@@ -418,7 +418,7 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect(
         "R25 a sign that an error leaves open counts as growth",
-        "tell/verdict.py",
+        "tell/numbers.py",
         "np.sign(value), 0.0)",
         "np.sign(value), 1.0)",
         "verdict",

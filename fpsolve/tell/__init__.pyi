@@ -4,7 +4,7 @@ from .blocks import Note as Note
 from .blocks import Sentence as Sentence
 from .curves import curve_grid as curve_grid
 from .eigenfunctions import draw_eigenfunction as draw_eigenfunction
-from .html import page_of as page_of
 from .progress import Phase as Phase
 from .progress import Watch as Watch
+from .reports import page_of as page_of
 from .terminal import print_blocks as print_blocks

@@ -41,14 +41,11 @@ from fpsolve.solve.question import Job, Numerics, fault
 from fpsolve.solve.sets import everything, result_of, solve_curve
 from fpsolve.tell import solved as results
 from fpsolve.tell.blocks import Sentence
-from fpsolve.tell.html import page_of, part_of_page
 from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
-from fpsolve.tell.numbers import indices, moment_grid
-from fpsolve.tell.problem import show as show_problem
+from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
 from fpsolve.tell.progress import waiting
-from fpsolve.tell.reports import COMPLETE
-from fpsolve.tell.verdict import meaning, verdict
+from fpsolve.tell.reports import COMPLETE, about, page_of, part_of_page
 from fpsolve.tell.views import field_of, listed, map_of, paths_of, refusal
 
 MOVING_RTOL = 1e-6
@@ -296,7 +293,7 @@ class Explorer:
                 title=case.headline,
                 state=COMPLETE,
                 equations=equations_of(case.system),
-                about=list(show_problem(case)),
+                about=list(about(case)),
                 facts={**facts_of(case, started), "case_text": self._text(case) if self.source.text else ""},
                 file=f"{self.source.name}-explored.toml",
                 more="`fpsolve run` of the case below writes all numbers.",

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtri
 
 from fpsolve.analysis.spreads import LEVEL
 from fpsolve.arrays import FloatArray
+from fpsolve.data import Quantity
 from fpsolve.drawing import figure_for, label_axes, plain_numbers
 from fpsolve.measured import NoiseFit
 from fpsolve.measured.signals import SIGNALS
@@ -21,6 +22,8 @@ from fpsolve.solve.noise import SIGNAL_WORDS, Critical, NoiseOutcome, density_of
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.text import likely, sampled
+
+F = TypeVar("F", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Convention:
         """G over S: 2 for one-sided values per Hz, 1/π per rad/s."""
         return 1 / SIDES[self.sided] / (2 * math.pi if self.per == "rad/s" else 1.0)
 
-    def frequency(self, omega: Any) -> Any:
+    def frequency(self, omega: F) -> F:
         """ω in the unit of frequencies."""
         return omega / UNITS[self.per]
 
@@ -71,41 +74,31 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
     paths = [folder / f"noise.{ending}" for ending in ("png", "pdf")]
     factor, x = shown.factor, shown.frequency(spectrum.frequencies)
     fine = np.geomspace(spectrum.frequencies[0], spectrum.frequencies[-1], 400)
-    kind = fit.parts[0].kind
-    title = f"{source.name}: {SIGNALS[outcome.wanted.of].words}, fitted by {kind} noise"
-    if len(fit.parts) > 1:
-        title = title.replace(f"{kind} noise", f"{len(fit.parts)} {kind} noises")
+    many, kind = len(fit.parts), fit.parts[0].kind
+    fitted = f"{kind} noise" if many == 1 else f"{many} {kind} noises"
+    title = f"{source.name}: {SIGNALS[outcome.wanted.of].words}, fitted by {fitted}"
+    density = factor * spectrum.density
     with figure_for(paths, title) as figure:
         axes = figure.subplots()
         if (band := band_of(fit)) is not None:
             axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
-        source_label = "formula" if spectrum.is_formula else "measured"
-        axes.loglog(x, factor * spectrum.density, ".", color="0.35", markersize=4, label=source_label)
+        axes.loglog(x, density, ".", color="0.35", label="formula" if spectrum.is_formula else "measured")
         values, _ = density_of(fit, fine.tolist())
-        axes.loglog(shown.frequency(fine), factor * values, "-", color="C0", label="fitted")
-        dashed: dict[str, Any] = {"color": "C1", "linestyle": "--"}
+        axes.loglog(shown.frequency(fine), factor * values, label="fitted")
         for each in fit.misfit:
-            place = shown.frequency(each.omega) if each.omega else x[0]
-            axes.axvline(place, **dashed)
+            place = shown.frequency(each.omega or spectrum.frequencies[0])
+            axes.axvline(place, color="C1", linestyle="--")
             name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
-            axes.annotate(name, (place, 1.0), (3, -3), xycoords=("data", "axes fraction"), textcoords="offset points",
-                          va="top", color="C1", fontsize="small")  # fmt: skip
-        axes.plot([], [], label="what stability depends on", **dashed)
-        axes.set_xlim(0.9 * x[0], x[-1] / 0.9)
+            corner = axes.get_xaxis_transform()
+            axes.text(place, 0.99, f" {name}", transform=corner, va="top", color="C1", fontsize="small")
+        axes.plot([], [], "--", color="C1", label="what stability depends on")
+        axes.set(xlim=(0.9 * x[0], x[-1] / 0.9), ylim=(0.3 * np.nanmin(density), 3 * np.nanmax(density)))
         for axis in (axes.xaxis, axes.yaxis):
             plain_numbers(axis)
-        low, high = np.nanmin(factor * spectrum.density), np.nanmax(factor * spectrum.density)
-        axes.set_ylim(0.3 * low, 3 * high)
-        symbol = {"Hz": "$f$", "rad/s": r"$\omega$"}[shown.per]
-        label_axes(
-            axes,
-            {"long_name": "frequency", "symbol": symbol, "units": shown.per},
-            {
-                "long_name": f"{shown.sided}-sided density of {words}",
-                "symbol": f"$G({symbol.strip('$')})$",
-                "units": shown.unit(noise_in),
-            },
-        )
+        symbol = {"Hz": "f", "rad/s": r"\omega"}[shown.per]
+        frequency = Quantity("", "", "frequency", f"${symbol}$", shown.per)
+        about = Quantity("", "", f"{shown.sided}-sided density of {words}", f"$G({symbol})$", shown.unit(noise_in))
+        label_axes(axes, frequency.attributes, about.attributes)
 
 
 def show(outcome: NoiseOutcome, source: Path, shown: Convention) -> Iterator[Block]:

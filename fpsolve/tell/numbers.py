@@ -1,18 +1,23 @@
-"""The numbers of one curve as a terminal and a report say them."""
+"""The numbers of a curve as a terminal and a report say them, and what they say of stability."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
 
-from fpsolve.analysis.excursions import Excursion
+import numpy as np
+
+from fpsolve.analysis.excursions import SYMBOL, Excursion
 from fpsolve.analysis.spreads import Spread
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.data import Quantity
 from fpsolve.exponent.error import Estimate, digits
 from fpsolve.exponent.quantities import (
+    CRITICAL_IMPACT_FACTOR,
     CRITICAL_RESTITUTION,
     INDICES,
+    LYAPUNOV_EXPONENT,
     MOMENT,
     OF_IMPACTS,
     STABILITY_INDEX,
@@ -22,10 +27,22 @@ from fpsolve.exponent.quantities import (
 from fpsolve.messages import Code, message_of
 from fpsolve.model.coordinates import infinite
 from fpsolve.model.quantity import MEAN_SQUARE, ResponseQuantities
+from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResponse, CurveResult
 from fpsolve.solve.intervals import INTERVAL, spreads_of
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence, filled
-from fpsolve.tell.text import NUMBER_COLUMNS, interval, percent, row_of, units_in_words
+from fpsolve.tell.text import (
+    EACH,
+    NUMBER_COLUMNS,
+    fate,
+    interval,
+    likely,
+    percent,
+    row_of,
+    short,
+    sign_of,
+    units_in_words,
+)
 
 
 def told_indices(case: Case) -> list[Index]:
@@ -52,21 +69,22 @@ def indices(case: Case, result: CurveResult) -> Iterator[Block]:
     """λ, δ_p, Λ(2) and what else is asked for, that of impacts for each ray; not where a figure is over a parameter."""
     if case.figure.x != "p":
         return
-    found_spreads, problem = spreads_of(case, result), result.curve.problem
-    told: list[tuple[Any, Estimate | None, float, Spread | None]] = [
-        (index, found, index.theory(problem) if found else math.nan, found_spreads.indices.get(index.name))
-        for index in told_indices(case)
-        for found in [result.estimates[index.name]]
-    ]
+    spreads = spreads_of(case, result)
+    rows = list[list[str]]()
+
+    def tell(about: Quantity, found: Estimate | None, instead: str, theory: float, spread: Spread | None) -> None:
+        words, symbol, number, *more = row_of(about, found, case.units.time)
+        closed = f"{theory:.6g}, Eq. {about.closed_form}" if math.isfinite(theory) else ""
+        held = interval(spread.low, spread.high) if spread else ""
+        rows.append([words, symbol, number or instead, *more, closed, held])
+
+    for index in told_indices(case):
+        found = result.estimates[index.name]
+        theory = index.theory(result.curve.problem) if found else math.nan
+        tell(index, found, index_text(index, result), theory, spreads.indices.get(index.name))
     if square := result.moment(2.0):
         [closed] = result.moments.perturbation[result.moments.p == 2]
-        told.append((MEAN_SQUARE, square, closed, found_spreads.moments.get(2.0)))
-    rows = list[list[str]]()
-    for about, found, theory, spread in told:
-        row = row_of(about, found, case.units.time)
-        row[2] = row[2] or index_text(about, result)
-        row.append(f"{theory:.6g}, Eq. {about.closed_form}" if math.isfinite(theory) else "")
-        rows.append([*row, interval(spread.low, spread.high) if spread else ""])
+        tell(MEAN_SQUARE, square, "", closed, spreads.moments.get(2.0))
     if any(result.estimates.values()):
         yield filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
 
@@ -74,8 +92,7 @@ def indices(case: Case, result: CurveResult) -> Iterator[Block]:
 def excursions(case: Case, result: CurveResult) -> Iterator[Sentence]:
     """What is known of P(sup ‖x‖ ≥ A) for every level, with the start and the norm."""
     found = result.excursion
-    told = [] if found is None else [text for level in case.excursions.levels if (text := _bounded(found, level))]
-    if found is None or not told:
+    if not found or not (told := [text for level in case.excursions.levels if (text := _bounded(found, level))]):
         return
     phi = "uniform φ₀" if isinstance(found.phi, str) else f"φ₀ = {found.phi:.6g}"
     start = f"{phi}, {'stationary noise' if isinstance(found.xi, str) else f'ξ₀ = {found.xi:.6g}'}"
@@ -83,21 +100,18 @@ def excursions(case: Case, result: CurveResult) -> Iterator[Sentence]:
     yield Sentence(f"Start with {start}: {', '.join(told)}; {norm}, and ‖x₀‖ = 1.")
 
 
-def bounds_text(found: Excursion, level: float) -> str:
+def bounds_text(found: Excursion, level: float, to: str = "-") -> str:
     """The bounds for one level: "0.035-0.054"; empty where there are none."""
     if found.is_certain:
         return "1"
     low, high = map(float, found.bounds(level))
-    return f"{_rounded(low, -1)}-{_rounded(high, 1)}" if low > 0 or high < 1 else ""
+    return f"{_rounded(low, -1)}{to}{_rounded(high, 1)}" if low > 0 or high < 1 else ""
 
 
 def _bounded(found: Excursion, level: float) -> str:
-    symbol = f"P(sup ‖x‖ ≥ {level:g})"
-    if found.is_certain:
-        return f"{symbol} = 1"
-    low, high = map(float, found.bounds(level))
-    if low > 0 or high < 1:
-        return f"{symbol} between {_rounded(low, -1)} and {_rounded(high, 1)}"
+    symbol, bounds = f"P(sup ‖x‖ ≥ {level:g})", bounds_text(found, level, " and ")
+    if bounds:
+        return f"{symbol} = 1" if bounds == "1" else f"{symbol} between {bounds}"
     many = float(found.expected_upcrossings(level))
     return f"{symbol} below about {many:.3g}, for large levels" if many < 1 else ""
 
@@ -137,22 +151,106 @@ STAR = "* for the noise reduced by Eqs. (12)-(14)"
 def moment_grid(case: Case, result: CurveResult) -> Grid:
     """Λ(p) at each p, with its error, its interval, and perturbation theory."""
     found, spreads = result.moments, spreads_of(case, result).moments
-    is_reduced = result.curve.noise.approximates_spectrum
-    has_theory = any(map(math.isfinite, found.perturbation))
-    columns = [Column("p"), Column(MOMENT.symbol), Column("± error")]
-    columns += [Column(INTERVAL), Column("P(Λ < 0)")] * bool(spreads)
-    theory = Column(f"perturbation, Eq. {MOMENT.closed_form}{'*' if is_reduced else ''}", 1)
-    columns += [theory, Column("difference", 2)] * has_theory
-    remarks = STAR * (is_reduced and has_theory), units_in_words(case.units.time, [MOMENT])
-    grid = Grid("", columns, remark="; ".join(filter(None, remarks)))
+    closed_form = f"Eq. {MOMENT.closed_form}{'*' if result.curve.noise.approximates_spectrum else ''}"
+    columns = Column("p"), Column(MOMENT.symbol), Column("± error"), Column(INTERVAL), Column("P(Λ < 0)")
+    more = Column(f"perturbation, {closed_form}", 1), Column("difference", 2)
+    rows, has_theory = list[list[str]](), any(map(math.isfinite, found.perturbation))
     for p, value, error, closed in zip(found.p, found.value, found.error_estimate, found.perturbation, strict=True):
         spread = spreads.get(float(p))
-        uncertain = ["", ""] if spread is None else [interval(spread.low, spread.high), percent(spread.below)]
-        compared = [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] * has_theory
-        shown = f"{error:.0e}" if error else "0"
-        grid.rows.append([f"{p + 0.0:g}", digits(value, error), shown, *uncertain * bool(spreads), *compared])
-    return grid
+        row = [f"{p + 0.0:g}", digits(value, error), f"{error:.0e}" if error else "0"]
+        row += [interval(spread.low, spread.high), percent(spread.below)] if spread else ["", ""]
+        row += [f"{closed + 0.0:.6g}", f"{value - closed + 0.0:.2e}"] if has_theory else ["", ""]
+        rows.append(row)
+    has_star = has_theory and "*" in closed_form
+    remarks = STAR * has_star, units_in_words(case.units.time, [MOMENT])
+    return filled("", [*columns, *more], rows, "; ".join(filter(None, remarks)))
 
 
-OF_CURVE: tuple[Callable[[Case, CurveResult], Iterator[Block]], ...] = indices, excursions, response
-"""What is told of each of a few curves, in this order."""
+PATH, SQUARE = "almost every path", "the mean square"
+"""What λ and Λ(2) tell of."""
+BURSTS = (
+    "Where the mean square grows though almost every path decays, rare paths carry it in bursts: a design that is "
+    "judged by the mean square, by energy or by fatigue is unstable, though one record most likely looks calm."
+)
+
+TREATED = {
+    "exact": "that of Eq. (7) as it stands",
+    "ou-reduction": "Ornstein-Uhlenbeck noise in place of that of Eq. (7), as Eqs. (12)-(14) reduce it",
+}
+"""What the noise is, by its treatment."""
+
+
+def verdicts(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Sentence]:
+    """Of which noise (7) the numbers are, and what becomes of almost every path and of the mean square.
+
+    Args:
+        table: the numbers of all curves.
+    """
+    yield Sentence("", case.headline)
+    for key, stated in case.parameters.items():
+        if key.endswith(".treatment") and key not in case.vary.keys:
+            yield Sentence(f'{key} = "{stated.value}": the noise is {TREATED[str(stated.value)]}.')
+    signs = _signs(case, table)
+    if len(results) > EACH:
+        told = [f"{what} decays in {sum(of < 0)} curves, and grows in {sum(of > 0)}" for what, of in signs.items()]
+        yield Sentence(_sentence(told))
+    else:
+        for each in results:
+            if text := verdict(case, each):
+                yield Sentence(f"{each.curve.label}: {text[0].lower()}{text[1:]}" if len(results) > 1 else text)
+    if len(signs) == 2 and ((signs[PATH] < 0) & (signs[SQUARE] > 0)).any():
+        yield Sentence(BURSTS)
+
+
+def _signs(case: Case, table: Table) -> dict[str, FloatArray]:
+    """Those of λ and Λ(2) of all curves, as far as a case asks for them; 0 where an error leaves one open."""
+    found = dict[str, FloatArray]()
+    for what, name in ((PATH, LYAPUNOV_EXPONENT.name), (SQUARE, MOMENT.name)):
+        if name in table and (what == PATH or 2 in case.p):
+            both = (table[each].values for each in (name, f"{name}_error"))
+            value, error = (each if what == PATH else each[:, case.p == 2][:, 0] for each in both)
+            found[what] = np.where(np.abs(value) > error, np.sign(value), 0.0)
+    return found
+
+
+def verdict(case: Case, result: CurveResult) -> str:
+    """The verdict on a curve: "Almost every path decays, halving in a time of 40; the mean square grows, ..."."""
+    spreads, told = spreads_of(case, result), list[str]()
+    for what, rate, spread in (
+        (PATH, result.lyapunov_exponent, spreads.indices.get(LYAPUNOV_EXPONENT.name)),
+        (SQUARE, result.moment(2.0), spreads.moments.get(2.0)),
+    ):
+        if spread:
+            told.append(likely(what, spread.below))
+        elif rate:
+            told.append(fate(what, rate.value, sign := sign_of(rate.value, rate.error_estimate), case.units.time))
+            if what == PATH and sign > 0:
+                settles = ", and settles into the stationary response" * (result.response is not None)
+                is_bounded = result.curve.problem.linear.cubic
+                told[0] += f" near rest{settles}" if is_bounded else ", and passes every level in the end"
+    return _sentence(told)
+
+
+def _sentence(told: Sequence[str]) -> str:
+    text = "; ".join(told)
+    return f"{text[:1].upper()}{text[1:]}." if text else ""
+
+
+def meaning(result: CurveResult) -> Iterator[Sentence]:
+    """What δ_p and R_c say, if they are there."""
+    index, critical = result.stability_index, result.estimates[CRITICAL_IMPACT_FACTOR.name]
+    if index:
+        power, number = digits(abs(index.value), index.error_estimate, 4), f"δ_p = {short(index)}"
+        yield Sentence(
+            f"{number} > 0: moments of the orders 0 < p < δ_p decay, those of p > δ_p grow. The "
+            f"probability that a path ever exceeds A times its start, {SYMBOL}, falls as A^-{power}."
+            if index.value > 0
+            else f"{number} < 0: moments of the orders δ_p < p < 0 decay, as almost every path grows. The "
+            f"probability that a path ever falls below a small share a of its start goes as a^{power}."
+        )
+    if critical:
+        loss = "more loss" if critical.value < 1 else "any loss"
+        yield Sentence(
+            f"R_c = {short(critical)}: with this factor of the speed at an impact λ would be 0; {loss} makes almost "
+            "every path decay."
+        )

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import math
+import tempfile
+from base64 import b64encode
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from datetime import datetime
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from fpsolve.case.case import Case
+from fpsolve.data import written
 from fpsolve.errors import FpsolveError
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
 from fpsolve.model.equation import equations_of
+from fpsolve.model.problem import Problem
 from fpsolve.results.tables import facts_of
-from fpsolve.tell import problem
-from fpsolve.tell.blocks import Block
-from fpsolve.tell.html import page_of
+from fpsolve.tell.blocks import TONES, WORDS, Block, Column, Drawing, Sentence, filled
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.progress import Phase, Watch
+from fpsolve.tell.text import EACH
 
 REPORT = "report.html"
 """The file of a report."""
@@ -61,7 +68,7 @@ def write_report(
                 title=case.headline,
                 state=COMPLETE if complete else INCOMPLETE,
                 equations=equations_of(next(case.curves(0, 1)).problem.system),
-                about=list(problem.show(case)),
+                about=list(about(case)),
                 facts=facts_of(case, started),
                 file=case.path.name,
                 more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
@@ -85,3 +92,93 @@ def shown_at_the_end(show: Callable[[], None]) -> Iterator[None]:
             show()
         raise
     show()
+
+
+def page_of(blocks: Iterable[Block], **head: Any) -> str:
+    """The page.
+
+    Args:
+        blocks: what stands on it; notes come last, and of each only one.
+        head: what else the template has: title, state, equations, about (blocks), facts, file, more.
+    """
+    head["about"] = [(type(each).__name__, each) for each in head["about"]]
+    return _filled("report.html", blocks, **head)
+
+
+def part_of_page(blocks: Iterable[Block]) -> str:
+    """Blocks alone, for a page that is there already."""
+    return _filled("part.html", blocks, title="")
+
+
+def _filled(template: str, blocks: Iterable[Block], **head: Any) -> str:
+    pieces = list(_pieces(blocks))
+    notes = dict.fromkeys(each for kind, each in pieces if kind == "Note")
+    return str(_templates().get_template(template).render(blocks=pieces, notes=notes, **head))
+
+
+@cache
+def _templates() -> Any:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    loader = FunctionLoader(lambda name: files("fpsolve.tell").joinpath(name).read_text(encoding="utf-8"))
+    made = Environment(autoescape=True, undefined=StrictUndefined, loader=loader)
+    made.globals |= {"words": WORDS, "tones": TONES}
+    return made
+
+
+def _pieces(blocks: Iterable[Block]) -> Iterator[tuple[str, Any]]:
+    """What the template prints: blocks by the names of their classes, of drawings what was drawn."""
+    for block in blocks:
+        if not isinstance(block, Drawing):
+            yield type(block).__name__, block
+        elif picture := _picture(block):
+            yield "picture", {"title": block.title, **picture}
+
+
+def _picture(drawing: Drawing) -> Mapping[str, str]:
+    """The address that is a picture itself, or why there is none; empty where there is nothing to draw."""
+    try:
+        with tempfile.TemporaryDirectory() as place:
+            drawing.draw([path := Path(place, f"picture.{drawing.kind}")], "")
+            if not path.exists():
+                return {}
+            kind = "svg+xml" if drawing.kind == "svg" else drawing.kind
+            return {"source": f"data:image/{kind};base64,{b64encode(path.read_bytes()).decode()}"}
+    except Exception as failure:  # the numbers shall not be lost for a picture
+        reason = str(failure) if isinstance(failure, FpsolveError) else f"{type(failure).__name__}: {failure}"
+        return {"source": "", "missing": str(Message(Code.NO_PICTURE, reason=reason))}
+
+
+def about(case: Case) -> Iterator[Block]:
+    """The noises, what the equation leaves out, and the parameters."""
+    problem = next(case.curves(0, 1)).problem
+    yield from map(Sentence, noise_sentences(problem))
+    if problem.linear.cubic:
+        yield Sentence(
+            "Terms of degree 3 act on the stationary response only: Λ(p), λ and δ_p are of the linear system."
+        )
+    if case.planned > 1:
+        keys = ", ".join(case.vary.keys)
+        yield Sentence(f"{case.planned} curves, over {keys}; the equation above is that of the first one.")
+    rows = []
+    for key, each in problem.parameters.items():
+        quantity = each.quantity.timed(case.units.time)
+        values = dict.fromkeys(case.vary.values(key)) if key in case.vary.keys else [each.value]
+        shown = ", ".join(map(written, values)) if len(values) <= EACH else f"{len(values)} values"
+        words = "" if quantity.words == key else quantity.words
+        rows.append([key, shown, quantity.unit_in_words, words])
+    headings = "key", "value", "unit", "what it is"
+    yield filled("", [Column(each, is_text=each != "value") for each in headings], rows)
+
+
+def noise_sentences(problem: Problem) -> list[str]:
+    """Each noise in a sentence: its kind, and how strong and how slow it is."""
+    lines = list[str]()
+    for section, noise in zip(problem.system.noise_sections, problem.noise.parts.values(), strict=False):
+        size, time = noise.standard_deviation, noise.correlation_time
+        numbers = [f"standard deviation {size:.6g}"] if 0 < size < math.inf else []
+        numbers += [f"correlation time {time:.6g}"] if 0 < time < math.inf else []
+        name = f"ξ of [{section}]" if len(problem.noise.parts) > 1 else "ξ"
+        lines.append(f"{name} is noise of the kind {noise.kind}{', with ' if numbers else ''}{' and '.join(numbers)}.")
+        lines[-1] += f" The equation is meant in {noise.sense} sense." if noise.sense else ""
+    return lines

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from fpsolve.case.case import Case
@@ -13,10 +14,9 @@ from fpsolve.solve.questions import BY_NAME
 from fpsolve.tell import curves
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
-from fpsolve.tell.numbers import OF_CURVE, moment_grid
+from fpsolve.tell.numbers import excursions, indices, meaning, moment_grid, response, verdicts
 from fpsolve.tell.pictures import FIGURES
 from fpsolve.tell.text import EACH, PICTURES, ROWS_OVER_P, duration, plural
-from fpsolve.tell.verdict import meaning, verdicts
 
 
 def show(
@@ -41,35 +41,35 @@ def show(
     samples = {each.curve.number: each for each in simulated}
     if len(results) > 1 or case.figure.x != "p":
         yield from curves.show(case, results, table)
+    is_each = len(results) == 1 or (is_whole and len(results) <= EACH)
     for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
         if not result.curve.is_possible:
             continue
-        if len(results) == 1 or (is_whole and len(results) <= EACH):
-            told, p = [*told_of(case, result)], result.moments.p
-            has_indices = any(result.estimates.values())  # which has Λ(2), too
-            if (
-                case.figure.x == "p"
-                and (is_whole or p.size <= ROWS_OVER_P)
-                and (p != 2 if has_indices else p == p).any()
-            ):
-                told.append(moment_grid(case, result))
-            yield from [Sentence("", result.curve.label), *told] if told else ()
+        told = [*told_of(case, result)] if is_each else []
+        if is_each and _has_grid(case, result, is_whole=is_whole):
+            told.append(moment_grid(case, result))
+        if told:
+            yield from (Sentence("", result.curve.label), *told)
         if place < PICTURES:
-            yield from figures_of(case, result, folder, samples)
+            yield from figures_of(case, result, folder, samples.get(result.curve.number))
 
 
 def told_of(case: Case, result: CurveResult) -> Iterator[Block]:
     """What is told of one curve, but for its verdict and Λ(p)."""
-    yield from (block for tell in OF_CURVE for block in tell(case, result))
-    yield from meaning(result)
+    yield from chain(indices(case, result), excursions(case, result), response(case, result), meaning(result))
 
 
-def figures_of(
-    case: Case, result: CurveResult, folder: Path, simulated: Mapping[int, SimulatedCurve]
-) -> Iterator[Drawing]:
-    """The figures of a curve, beside the simulations by the numbers of their curves."""
+def _has_grid(case: Case, result: CurveResult, *, is_whole: bool) -> bool:
+    """Whether Λ(p) has a table: over p, of few p or where all is told; Λ(2) alone stands beside indices already."""
+    p, has_indices = result.moments.p, any(result.estimates.values())
+    is_more = (p != 2).any() if has_indices else p.size > 0
+    return bool(case.figure.x == "p" and (is_whole or p.size <= ROWS_OVER_P) and is_more)
+
+
+def figures_of(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+    """The figures of a curve, beside its simulation."""
     for draw in FIGURES.values():
-        yield from draw(case, result, folder, simulated.get(result.curve.number))
+        yield from draw(case, result, folder, simulated)
 
 
 def write_figures(
@@ -81,7 +81,7 @@ def write_figures(
     samples = {each.curve.number: each for each in simulated}
     of_first, of_others = (any(BY_NAME[name].asked(case, number) is not None for name in FIGURES) for number in (1, 2))
     for result in results if of_others else results[:1] if of_first else ():
-        for figure in figures_of(case, result, folder, samples):
+        for figure in figures_of(case, result, folder, samples.get(result.curve.number)):
             figure.write(folder)
 
 

@@ -29,8 +29,8 @@ from fpsolve.solve.chart import Chart, begun_lines, solve_chart
 from fpsolve.solve.question import Numerics
 from fpsolve.tell.blocks import Column, Drawing, Grid, Sentence
 from fpsolve.tell.chart import show
-from fpsolve.tell.html import part_of_page
 from fpsolve.tell.local import Answer
+from fpsolve.tell.reports import part_of_page
 from fpsolve.tell.text import sampled
 
 PIXELS = 144, 72

@@ -13,7 +13,7 @@ from tests.inner.test_workflow import raising
 from tests.kit import LEAN, TEXT, case_in, files, run, solve_sets
 
 
-@pytest.mark.parametrize("place", ["fpsolve.tell.problem.noise_sentences", "fpsolve.tell.reports.page_of"])
+@pytest.mark.parametrize("place", ["fpsolve.tell.reports.noise_sentences", "fpsolve.tell.reports.page_of"])
 def test_a_fault_in_the_report_costs_nothing_else(tmp_path, monkeypatch, place):
     monkeypatch.setattr(place, raising(RuntimeError("a fault")))
     done = run(tmp_path, "run", "case.toml", "--report", "--set", LEAN, case=TEXT)
