@@ -140,9 +140,8 @@ def _told_moments(case: Case) -> list[float]:
 def _numbers(case: Case, result: CurveResult) -> Cells:
     """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the other indices."""
     over_p, told, spreads = case.figure.x == "p", told_indices(case), spreads_of(case, result).indices
-    texts = {each: index_text(each, result, DIGITS) for each in told}
-    if result.status.fails:
-        texts |= {each: "" for each in told if result.estimates[each.name] is None}
+    lost = [each for each in told if result.estimates[each.name] is None] if result.status.fails else []
+    texts = {each: "" if each in lost else index_text(each, result, DIGITS) for each in told}
     for index in [each for each in told if each in MAIN]:
         yield Column(index.symbol), texts[index]
         is_second = index == STABILITY_INDEX

@@ -52,7 +52,6 @@ _TANGENT = 0.1
 """Length of half a tangent, as a share of the width of the axes."""
 _BETWEEN = "#00C800"
 """Of the line of zeros between values."""
-Pair = tuple[CurveResult, SimulatedCurve | None]
 _NOTHING = np.zeros(0)
 
 
@@ -62,7 +61,6 @@ class Series:
 
     Attributes:
         varied: the parameters that tell it from the others.
-        simulated: x, y and the standard errors of y from a simulation, shape (3, n).
         root: the stability index, which is marked on the zero line; None where there is none among the x.
         slope: λ, which is marked as the tangent at 0; None where it is not.
     """
@@ -72,7 +70,6 @@ class Series:
     y: FloatArray
     line_x: FloatArray
     line_y: FloatArray
-    simulated: FloatArray | None = None
     root: float | None = None
     slope: float | None = None
 
@@ -138,15 +135,14 @@ def _draw(
 def _draw_curves(
     case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], table: Table, axes: Axes
 ) -> None:
-    setting, samples = case.figure, {each.curve.number: each for each in simulated}
-    pairs = [(result, samples.get(result.curve.number)) for result in results]
+    setting = case.figure
     if setting.x == "p":
-        shown = _with_theory(case, len(pairs))
-        series = [_moment_series(case, *pair, with_theory=i in shown) for i, pair in enumerate(pairs)]
+        shown = _with_theory(case, len(results))
+        series = [_moment_series(case, result, with_theory=i in shown) for i, result in enumerate(results)]
     else:
-        series = _over_parameter(case, pairs, _numbers(case, table))
+        series = _over_parameter(case, results, _numbers(case, table))
     over = P if setting.x == "p" else case.about(setting.x)
-    colours = draw_series(axes, case, series, over, setting.quantity)
+    colours = draw_series(axes, case, series, over, setting.quantity, _dots(case, simulated))
     places = np.concatenate([item.x for item in series])
     is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
     scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
@@ -172,11 +168,10 @@ def _with_theory(case: Case, count: int) -> set[int]:
     return shown if case.figure.lines else set()
 
 
-def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | None, *, with_theory: bool) -> Series:
+def _moment_series(case: Case, result: CurveResult, *, with_theory: bool) -> Series:
     p = result.moments.p
     first, last = (float(p.min()), float(p.max())) if p.size else (math.nan, math.nan)
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
-    estimates = sample.result.estimates if sample else ()
     root, slope = (
         found.value if each.name in case.figure.mark and (found := result.estimates[each.name]) else None
         for each in (STABILITY_INDEX, LYAPUNOV_EXPONENT)
@@ -187,9 +182,8 @@ def _moment_series(case: Case, result: CurveResult, sample: SimulatedCurve | Non
         result.moments.value,
         line,
         perturbed_moments(result.curve.problem, line) if line.size else line,
-        _columns([(each.p, each.value, each.standard_error) for each in estimates if each.value is not None]),
-        root=root if root is not None and first <= root <= last else None,
-        slope=slope if first <= 0 <= last else None,
+        root if root is not None and first <= root <= last else None,
+        slope if first <= 0 <= last else None,
     )
 
 
@@ -205,29 +199,32 @@ def _rates(result: CurveResult, *, with_theory: bool) -> Series:
     return Series(dict(result.curve.varied), s, found.rate_function[known], line, values)
 
 
-def _over_parameter(case: Case, pairs: Sequence[Pair], numbers: FloatArray) -> list[Series]:
+def _over_parameter(case: Case, results: Sequence[CurveResult], numbers: FloatArray) -> list[Series]:
     """A number over the parameter: one series for each set of the other parameters that vary."""
     key = case.figure.x
-    groups: dict[tuple[tuple[str, Value], ...], list[Pair]] = {}
-    for pair in pairs:
-        others = tuple((name, value) for name, value in pair[0].curve.varied.items() if name != key)
-        groups.setdefault(others, []).append(pair)
+    groups: dict[tuple[tuple[str, Value], ...], list[Curve]] = {}
+    for result in results:
+        others = tuple((name, value) for name, value in result.curve.varied.items() if name != key)
+        groups.setdefault(others, []).append(result.curve)
     shown, found = _with_theory(case, len(groups)), []
-    for i, (others, group) in enumerate(groups.items()):
-        x = np.array([float(result.curve.varied[key]) for result, _ in group])
+    for i, (others, curves) in enumerate(groups.items()):
+        x = np.array([curve.varied[key] for curve in curves], dtype=float)
         line = (np.geomspace if x.min() > 0 else np.linspace)(x.min(), x.max(), 200) if i in shown else _NOTHING
-        dots = [(at, _simulated(case, sample)) for at, (_, sample) in zip(x, group, strict=True) if sample]
-        found.append(
-            Series(
-                dict(others),
-                x,
-                numbers[[result.curve.number - 1 for result, _ in group]],
-                line,
-                np.array([_theory(case, case.curve({**dict(others), key: float(each)})) for each in line]),
-                _columns([(at, *dot) for at, dot in dots if dot]),
-            )
-        )
+        theory = [_theory(case, case.curve({**dict(others), key: float(each)})) for each in line]
+        found.append(Series(dict(others), x, numbers[[curve.number - 1 for curve in curves]], line, np.array(theory)))
     return found
+
+
+def _dots(case: Case, simulated: Sequence[SimulatedCurve]) -> FloatArray:
+    """The same of all simulated curves: x, y and the standard errors of y, shape (3, n)."""
+    x, p, found = case.figure.x, case.figure.moment, list[tuple[Value | None, ...]]()
+    for each in simulated:
+        if x != "p" and p is None:
+            found.append((each.curve.varied[x], *each.estimates.get(case.figure.needed, (None, None))))
+        else:
+            wanted = [one for one in each.result.estimates if p is None or same(one.p, p)]
+            found += [(one.p if x == "p" else each.curve.varied[x], one.value, one.standard_error) for one in wanted]
+    return np.array([each for each in found if None not in each], dtype=float).reshape(-1, 3).T
 
 
 def _numbers(case: Case, table: Table) -> FloatArray:
@@ -248,25 +245,14 @@ def _theory(case: Case, curve: Curve) -> float:
     return value if index.interval[0] <= value <= index.interval[1] else math.nan
 
 
-def _simulated(case: Case, sample: SimulatedCurve) -> tuple[float, float] | None:
-    """The same from a simulation, with its standard error."""
-    p = case.figure.moment
-    if p is None:
-        return sample.estimates.get(case.figure.needed)
-    found = [each for each in sample.result.estimates if same(each.p, p)]
-    return next(
-        ((e.value, e.standard_error) for e in found if e.value is not None and e.standard_error is not None), None
-    )
-
-
-def _columns(dots: Sequence[tuple[float | None, ...]]) -> FloatArray | None:
-    return np.array(dots, dtype=float).T if dots else None
-
-
 def draw_series(
-    axes: Axes, case: Case, series: Sequence[Series], over: Quantity, about: Quantity
+    axes: Axes, case: Case, series: Sequence[Series], over: Quantity, about: Quantity, dots: FloatArray = _NOTHING
 ) -> Sequence[ColorType]:
-    """Draw a quantity over another one for several curves; the colours of these."""
+    """Draw a quantity over another one for several curves, and simulated dots; the colours of the curves.
+
+    Args:
+        dots: x, y and the standard errors of y, shape (3, n).
+    """
     label_axes(axes, *(each.timed(case.units.time).attributes for each in (over, about)))
     axes.axhline(0, **ZERO)
     is_few = len(series) <= MOST_NAMED
@@ -279,9 +265,8 @@ def draw_series(
         equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
         words = f"perturbation, Eq. {equation}" + f", of {len(theories)} curves" * (not is_few)
         axes.plot([], [], color="0.35" if is_few else "black", linestyle="-" if is_few else "--", label=words)
-    if simulated := [item.simulated for item in series if item.simulated is not None]:
-        x, y, error = np.concatenate(simulated, axis=1)
-        draw_dots(axes, x, y, error, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5)
+    if dots.size:
+        draw_dots(axes, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5)
     axes.margins(x=0.03)
     return colours
 

@@ -56,6 +56,6 @@ def test_figure_marks_each_index_on_the_zero_line_and_each_exponent_as_a_tangent
     [roots] = [each.get_offsets() for each in axes.collections if len(each.get_offsets()) == 3]
     np.testing.assert_allclose(roots, [(each.stability_index, 0.0) for each in theories])
     p = np.linspace(-2, 2, 100)
-    draw_series(axes, case, [Series({}, p, p, p, p, np.array([p, p**2, p**2]))], P, MOMENT)
+    draw_series(axes, case, [Series({}, p, p, p, p)], P, MOMENT, np.array([p, p**2, p**2]))
     np.testing.assert_array_equal(axes.containers[-1].lines[0].get_xydata(), np.stack([p, p**2], axis=1))
     assert "finite elements (not all marked)" in axes.get_legend_handles_labels()[1]
