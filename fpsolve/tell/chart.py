@@ -26,9 +26,9 @@ from fpsolve.tell.text import plural
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-TINTS = ("#FFFFFF", "#F3EFE6", "#E9DFCB", "#DBCBAA", "#C9B388")
+TINTS = ((1.0, 1.0, 1.0), (0.953, 0.937, 0.902), (0.914, 0.875, 0.796), (0.859, 0.796, 0.667), (0.788, 0.702, 0.533))
 """Of regions, the darker the more of the quantities grow there."""
-UNKNOWN = "#C4C8CE"
+UNKNOWN = (0.769, 0.784, 0.808)
 """Of the rest of a frame."""
 NAMED = 0.01
 """Share of the frame from which on a region has room for a letter; smaller ones are in chart.json only."""
@@ -77,14 +77,12 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
 
 def _shade(axes: Axes, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, str]:
     """Draw a tint for each region, and its name, or where that has no room a letter; these by the names."""
-    from matplotlib.colors import ListedColormap
-
     x, y = frame
     edges, letters, small = np.linspace(0, 1, len(regions.index) + 1), iter(ascii_lowercase), dict[str, str]()
     unstable = (sum(sign > 0 for sign in each.signs.values()) for each in regions.each)
     tints = [TINTS[min(count, len(TINTS) - 1)] for count in unstable]
-    mesh = axes.pcolormesh(x.value(edges), y.value(edges), regions.index.T, rasterized=True)
-    mesh.set(cmap=ListedColormap([UNKNOWN, *tints]), clim=(-1.5, len(tints) - 0.5))
+    colours = np.array([*tints, UNKNOWN])[regions.index.T]  # -1 is the last one
+    axes.pcolormesh(x.value(edges), y.value(edges), colours, rasterized=True)
     if (regions.index < 0).any():
         axes.fill([], [], color=UNKNOWN, label="not solved, or not defined")
     for number, (each, tint) in enumerate(zip(regions.each, tints, strict=True)):

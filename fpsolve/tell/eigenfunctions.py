@@ -12,7 +12,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.data import Quantity
-from fpsolve.drawing import MOST_LINES, QUARTERS, draw_colours, label_axes, styled
+from fpsolve.drawing import MOST_LINES, QUARTERS, canvas_into, draw_colours, label_axes
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
@@ -73,13 +73,9 @@ def draw_eigenfunction(
     """
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    from matplotlib.figure import Figure
-
     problem, content = pair.generator.problem, BytesIO()
     known = {key: each._replace(quantity=each.quantity.timed(time_unit)) for key, each in problem.parameters.items()}
-    with styled():
-        figure = Figure(layout="constrained")  # which belongs to no window
-        axes = figure.add_subplot()
+    with canvas_into(content) as axes:
         if choose(problem).pictures == DIRECTIONS:
             found = on_nodes(pair)
             values = found.fields._asdict()[field]
@@ -87,9 +83,8 @@ def draw_eigenfunction(
         else:
             _draw_over_noise(pair, field, cmap, time_unit, axes)
         number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g}"
-        figure.suptitle(f"{number} ({MOMENT.timed(time_unit).unit})", parse_math=False)
+        axes.figure.suptitle(f"{number} ({MOMENT.timed(time_unit).unit})", parse_math=False)
         axes.set_title("\n".join(parameter_lines(known)), fontsize=9, parse_math=False)
-        figure.savefig(content, format="png", dpi=150)
     return Picture(content.getvalue())
 
 
@@ -104,8 +99,6 @@ def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, time_unit: str,
 
     The scale begins at 0 where the least value is next to it, or all are the same.
     """
-    from matplotlib.colors import LogNorm, Normalize
-
     nodes, about = Nodes.of(pair, FINER).seen(pair), _about(field, Grid.of(pair), time_unit)
     values = nodes.at_xi(nodes.fields(pair)._asdict()[field])
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
@@ -113,9 +106,11 @@ def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, time_unit: str,
     if nodes.is_lines:
         _draw_lines(axes, nodes, values, is_log=is_log)
     else:
-        is_next = abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high
-        look = {"cmap": cmap, "norm": LogNorm(low, high) if is_log else Normalize(0.0 if is_next else low, high)}
-        draw_colours(axes, nodes.phi.ravel(), nodes.xi, values.T, about.attributes, shading="gouraud", **look)
+        is_next = not is_log and (abs(low) < NEXT_TO_ZERO * high or high - low < 1e-6 * high)
+        ends = {"norm": "log" if is_log else "linear", "vmin": 0.0 if is_next else low, "vmax": high}
+        draw_colours(
+            axes, nodes.phi.ravel(), nodes.xi, values.T, about.attributes, shading="gouraud", cmap=cmap, **ends
+        )
     for impact in nodes.impacts:
         axes.axvline(impact, color=RED, linewidth=1.2)
     axes.set_xticks(*QUARTERS)

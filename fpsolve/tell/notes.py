@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 from fpsolve.case.case import MOST_DRAWN, Case, Curve
 from fpsolve.case.sections import RESPONSE
@@ -35,7 +34,7 @@ def notes(
     if count is None:
         found = tuple(found)
         count = len(found)
-    groups: dict[Severity, dict[Any, list[tuple[Message, Curve]]]] = {severity: {} for severity in WORDS}
+    groups: dict[Severity, dict[object, list[tuple[Message, Curve]]]] = {severity: {} for severity in WORDS}
     for each in found:
         for severity, messages in each.remarks.items():
             for message in map(message_of, messages):

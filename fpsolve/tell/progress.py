@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -46,7 +45,7 @@ Advance = Callable[..., None]
 """What a phase calls as it goes on: with how many steps are done, `failed` of them, `known` if by an earlier run."""
 
 
-def ignore(*_: Any, **__: Any) -> None:
+def ignore(*_: object, **__: object) -> None:
     """Progress that is not shown."""
 
 

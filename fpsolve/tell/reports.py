@@ -11,7 +11,8 @@ from datetime import datetime
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from fpsolve.case.case import Case
 from fpsolve.data import written
@@ -94,15 +95,15 @@ def shown_at_the_end(show: Callable[[], None]) -> Iterator[None]:
     show()
 
 
-def page_of(blocks: Iterable[Block], **head: Any) -> str:
+def page_of(blocks: Iterable[Block], *, about: Iterable[Block], **head: object) -> str:
     """The page.
 
     Args:
         blocks: what stands on it; notes come last, and of each only one.
-        head: what else the template has: title, state, equations, about (blocks), facts, file, more.
+        about: the problem.
+        head: what else the template has: title, state, equations, facts, file, more.
     """
-    head["about"] = [(type(each).__name__, each) for each in head["about"]]
-    return _filled("report.html", blocks, **head)
+    return _filled("report.html", blocks, about=[*_pieces(about)], **head)
 
 
 def part_of_page(blocks: Iterable[Block]) -> str:
@@ -110,23 +111,21 @@ def part_of_page(blocks: Iterable[Block]) -> str:
     return _filled("part.html", blocks, title="")
 
 
-def _filled(template: str, blocks: Iterable[Block], **head: Any) -> str:
+def _filled(template: str, blocks: Iterable[Block], **head: object) -> str:
     pieces = list(_pieces(blocks))
     notes = dict.fromkeys(each for kind, each in pieces if kind == "Note")
     return str(_templates().get_template(template).render(blocks=pieces, notes=notes, **head))
 
 
 @cache
-def _templates() -> Any:
-    from jinja2 import Environment, FunctionLoader, StrictUndefined
-
+def _templates() -> Environment:
     loader = FunctionLoader(lambda name: files("fpsolve.tell").joinpath(name).read_text(encoding="utf-8"))
     made = Environment(autoescape=True, undefined=StrictUndefined, loader=loader)
     made.globals |= {"words": WORDS, "tones": TONES}
     return made
 
 
-def _pieces(blocks: Iterable[Block]) -> Iterator[tuple[str, Any]]:
+def _pieces(blocks: Iterable[Block]) -> Iterator[tuple[str, object]]:
     """What the template prints: blocks by the names of their classes, of drawings what was drawn."""
     for block in blocks:
         if not isinstance(block, Drawing):

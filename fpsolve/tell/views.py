@@ -150,7 +150,7 @@ def panel(
 
 def paths_of(case: Case) -> Answer:
     """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
-    from fpsolve.simulation.coefficients import coefficients, starting_state  # which compiles
+    from fpsolve.simulation.coefficients import coefficients, starting_state  # which takes 110 ms
     from fpsolve.simulation.kernels import RENORMALISED, advance
     from fpsolve.simulation.setup import obstacles, simulated_parts
 
