@@ -228,11 +228,10 @@ def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
     """Draw the first variable of a dataset with its error: a point, a line or colours, by its dimensions."""
     main = next(iter(found.data_vars.values()))
     error = found.get(f"{main.name}_error")
-    label = {"label": found.attrs["method"]}
     if main.ndim == 0:
         draw_point(axes, main, error, **kwargs)
     elif main.ndim == 1:
-        draw_line(axes, main, error, **{**label, **kwargs})
+        draw_line(axes, main, error, **{"label": found.attrs["method"], **kwargs})
     else:
         draw_plane(axes, main, **kwargs)
     finish(axes, **kwargs)

@@ -35,7 +35,6 @@ from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
-from fpsolve.results.tables import facts_of
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import Job, Numerics, fault
 from fpsolve.solve.sets import everything, result_of, solve_curve
@@ -45,13 +44,13 @@ from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
 from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
 from fpsolve.tell.progress import waiting
-from fpsolve.tell.reports import COMPLETE, about, page_of, part_of_page
+from fpsolve.tell.reports import COMPLETE, page_of, part_of_page
 from fpsolve.tell.views import field_of, listed, map_of, paths_of, refusal
 
 MOVING_RTOL = 1e-6
 """Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
-APART = 1 / 6
-"""Share of the interval of p between those that are solved while a slider moves, at least; 0, 2 and the ends are."""
+MOVING_P = 7
+"""About so many p are solved while a slider moves; 0, 2 and the ends are among them."""
 FEW = 9
 """A case with fewer p is shown at others, too."""
 USUAL_P = np.linspace(-2.0, 4.0, 13)
@@ -80,27 +79,22 @@ class Explorer:
 
     def __init__(self, case: Case, code: str) -> None:
         first = next(case.curves(0, 1)).problem
-        kinds = CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
-        p, method = case.p, choose(first)
+        method, kinds = choose(first), CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
         self.moves, has_square = method.is_quick, method.reason(2.0) is None
-        if has_square:
-            more = USUAL_P if p.size < FEW and self.moves else FEWEST_P
-            p = np.union1d(p, more[more >= method.interval[0]] if method.has_pairs else more[1:])
+        more = USUAL_P if case.p.size < FEW and self.moves else FEWEST_P
+        more = more[more >= method.interval[0]] if method.has_pairs else more[1:]
+        p = np.union1d(case.p, more) if has_square and not {*more} <= {*case.p} else case.p
         quantities = kinds if method.has_pairs else kinds[:1]
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
         self._written = quantities[: 2 + has_square]
-        is_same = np.array_equal(np.sort(case.p), p)
         changed = {
             "vary": Vary(), "figure": FigureSection(), "uncertain": Uncertain(), "expect": (), "chart": None,
-            "moments": case.moments.model_copy(update={} if is_same else {"p": tuple(p.tolist())}),
+            "moments": case.moments.model_copy(update={"p": tuple(p.tolist())}),
             "output": OutputSection(quantities=quantities), "system": first.system, "noise": first.noise,
         }  # fmt: skip
-        self.case = case.model_copy(update=changed)
-        few = [p[0], p[-1], *p[(p == 0) | (p == 2)]]
-        for each in p:
-            if np.min(np.abs(few - each)) >= APART * np.ptp(p):
-                few.append(each)
-        self._few, self._drawing = np.unique(few).tolist(), threading.Lock()
+        self.case, p = case.model_copy(update=changed), np.unique(p)
+        chosen = np.isin(p, (p[0], 0.0, 2.0, p[-1])) | (np.arange(p.size) % (1 + p.size // MOVING_P) == 0)
+        self._few, self._drawing = p[chosen].tolist(), threading.Lock()
         self._newest, self._stopped = dict[tuple[str, str], float](), dict[str, float]()
         self._so_far = dict[str, dict[str, Answer | str]]()
         self._answers: dict[str, Callable[[Question], Answer]] = {
@@ -289,14 +283,13 @@ class Explorer:
         found = self._solved(case)
         with self._drawing:  # matplotlib draws in one style at a time
             page = page_of(
+                case,
                 chain(results.show(case, [found], Path()), notes(case, [found], "")),
-                title=case.headline,
+                started,
                 state=COMPLETE,
-                equations=equations_of(case.system),
-                about=list(about(case)),
-                facts={**facts_of(case, started), "case_text": self._text(case) if self.source.text else ""},
                 file=f"{self.source.name}-explored.toml",
                 more="`fpsolve run` of the case below writes all numbers.",
+                case_text=self._text(case) if self.source.text else "",
             )
         return {"name": f"{self.source.name}-explored.html", "text": page}
 

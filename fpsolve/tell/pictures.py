@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import RESPONSE, SENSITIVITIES
 from fpsolve.drawing import Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes
@@ -27,39 +26,34 @@ from fpsolve.theory.perturbation import scale_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from fpsolve.simulation.response import Response
-
 
 def _of_response(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
-    """response.png and .pdf, where there are densities."""
-    if case.output.figure and result.response and result.response.density:
-        draw = partial(_draw_response, case, result, simulated.response if simulated else None)
-        yield Drawing(f"Stationary response{result.curve.of}", draw, f"response{result.curve.suffix}", case.headline)
-
-
-def _draw_response(
-    case: Case, result: CurveResult, sample: Response | None, paths: Sequence[Path], heading: str
-) -> None:
-    """The densities of both variables and of the amplitude; above both, what they do at rest.
+    """response.png and .pdf, where there are densities: of both variables, of the amplitude, and what they do at rest.
 
     Beside that of the amplitude stands a simulated one, where there is one.
     """
-    found, system = result.response, result.curve.problem.linear
-    if found is None or (density := found.density) is None:
+    found, curve = result.response, result.curve
+    if not (case.output.figure and found and (density := found.density)):
         return
-    with figure_for(paths, heading, result.curve.held(case.units.time), Format(width=10.5)) as figure:
-        plane, radial = figure.subplots(1, 2)
-        _draw_joint_density(plane, found, density, system, case)
-        radial.plot(density.amplitude, density.of_amplitude, label="finite elements")
-        about = system.response.amplitude, system.response.amplitude_density
-        label_axes(radial, *(each.timed(case.units.time).attributes for each in about))
-        end = density.amplitude[0] + density.amplitude[-1]
-        radial.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
-        radial.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
-        if sample:
-            x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
-            dots = x, sample.amplitude_density, sample.amplitude_error
-            draw_dots(radial, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black")
+
+    def draw(paths: Sequence[Path], heading: str) -> None:
+        of = curve.problem.linear.response
+        with figure_for(paths, heading, curve.held(case.units.time), Format(width=10.5)) as figure:
+            plane, radial = figure.subplots(1, 2)
+            _draw_joint_density(plane, found, density, curve.problem.linear, case)
+            radial.plot(density.amplitude, density.of_amplitude, label="finite elements")
+            label_axes(
+                radial, *(each.timed(case.units.time).attributes for each in (of.amplitude, of.amplitude_density))
+            )
+            end = density.amplitude[0] + density.amplitude[-1]
+            radial.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
+            radial.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
+            if sample := simulated and simulated.response:
+                x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
+                dots = x, sample.amplitude_density, sample.amplitude_error
+                draw_dots(radial, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black")
+
+    yield Drawing(f"Stationary response{curve.of}", draw, f"response{curve.suffix}", case.headline)
 
 
 def _draw_joint_density(
@@ -85,21 +79,21 @@ def _at_rest(words: str, index: float | None, limit: int) -> str:
 def _of_sensitivities(
     case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None
 ) -> Iterator[Drawing]:
-    """sensitivities.png and .pdf, if the case asks for them."""
-    if case.output.sensitivities and result.sensitivities:
-        curve, draw = result.curve, partial(_draw_sensitivities, case, result.curve, result.sensitivities)
-        yield Drawing(f"Effect of the parameters{curve.of}", draw, f"sensitivities{curve.suffix}", case.headline)
+    """sensitivities.png and .pdf, if the case asks for them: θ ∂/∂θ of λ and of some Λ(p), scaled."""
+    curve, found = result.curve, result.sensitivities
+    if not (case.output.sensitivities and found):
+        return
 
+    def draw(paths: Sequence[Path], heading: str) -> None:
+        scale, bars = scale_of(curve.problem), dict[str, list[float]]()
+        for label, (p, slopes) in found.shown().items():
+            size = float(scale.moment(p)) if p else scale.linear
+            bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
+        with figure_for(paths, heading, curve.held(case.units.time)) as figure:
+            words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
+            draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
-def _draw_sensitivities(case: Case, curve: Curve, found: Sensitivities, paths: Sequence[Path], heading: str) -> None:
-    """θ ∂/∂θ of λ and of some Λ(p), scaled."""
-    scale, bars = scale_of(curve.problem), dict[str, list[float]]()
-    for label, (p, slopes) in found.shown().items():
-        size = float(scale.moment(p)) if p else scale.linear
-        bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
-    with figure_for(paths, heading, curve.held(case.units.time)) as figure:
-        words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
-        draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
+    yield Drawing(f"Effect of the parameters{curve.of}", draw, f"sensitivities{curve.suffix}", case.headline)
 
 
 MOST_PANELS = 4

@@ -9,7 +9,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.proofs.certificate import Enclosure
-from fpsolve.proofs.claims import plain, verdicts
+from fpsolve.proofs.claims import verdicts
 from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.solve.prove import CurveProof
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
@@ -18,8 +18,6 @@ from fpsolve.tell.text import EACH, PROOFS, ROWS
 
 NOT_PROVEN = "not proven"
 """The word where no bound is proven."""
-LONGEST = 12
-"""Digits of a p at most in a table."""
 FATES = {1: "grows", -1: "decays", 0: "open"}
 """The fate of a path or a moment by the sign of its exponent."""
 
@@ -45,7 +43,7 @@ def proof_grid(proof: CurveProof) -> Grid:
     columns = [Column("quantity"), Column("≥"), Column("≤"), Column("width", 2), Column("what it says", 1)]
     grid = Grid("", columns)
     bounds: list[tuple[str, Enclosure | IndexEnclosure | None, str]]
-    bounds = [(f"Λ({_order(p)})", found, _fate(p, found)) for p, found in proof.moments]
+    bounds = [(f"Λ({p:.10g})", found, _fate(p, found)) for p, found in proof.moments]
     if (path := proof.exponent) is not None:
         bounds.append((LYAPUNOV_EXPONENT.symbol, path, FATES[path.sign] if path.is_proven else NOT_PROVEN))
     if proof.index is not None:
@@ -73,7 +71,7 @@ def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
         if len(proof.moments) > PROOFS:
             yield Column("moments", 3), _counted(proof)
         else:
-            yield from ((Column(f"p = {_order(p)}", 3), _fate(p, found)) for p, found in proof.moments)
+            yield from ((Column(f"p = {p:.10g}", 3), _fate(p, found)) for p, found in proof.moments)
 
     return grid_of(case, proofs[:ROWS], cells)
 
@@ -82,11 +80,6 @@ def _fate(p: float, found: Enclosure | None) -> str:
     if found is None or not found.is_proven:
         return "not tried" if found is None else NOT_PROVEN
     return FATES[found.sign] if p else "is constant"
-
-
-def _order(p: float) -> str:
-    """p for the eye."""
-    return text if len(text := plain(p)) <= LONGEST else f"{p:.10g}"
 
 
 def _counted(proof: CurveProof) -> str:

@@ -64,16 +64,9 @@ def write_report(
     also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
     with watch.bar(Phase(case.name, "report")), writable(folder):
         try:
-            text = page_of(
-                blocks,
-                title=case.headline,
-                state=COMPLETE if complete else INCOMPLETE,
-                equations=equations_of(next(case.curves(0, 1)).problem.system),
-                about=list(about(case)),
-                facts=facts_of(case, started),
-                file=case.path.name,
-                more=f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}",
-            )
+            state = COMPLETE if complete else INCOMPLETE
+            more = f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}"
+            text = page_of(case, blocks, started, state=state, file=case.path.name, more=more)
         except OSError:
             raise
         except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
@@ -95,15 +88,30 @@ def shown_at_the_end(show: Callable[[], None]) -> Iterator[None]:
     show()
 
 
-def page_of(blocks: Iterable[Block], *, about: Iterable[Block], **head: object) -> str:
-    """The page.
+def page_of(
+    case: Case, blocks: Iterable[Block], started: datetime, *, state: str, file: str, more: str, **facts: object
+) -> str:
+    """The page of a case.
 
     Args:
         blocks: what stands on it; notes come last, and of each only one.
-        about: the problem.
-        head: what else the template has: title, state, equations, facts, file, more.
+        started: when the command was.
+        state: whether all was done.
+        file: the name of the case.
+        more: where the numbers are.
+        facts: other than those of the case.
     """
-    return _filled("report.html", blocks, about=[*_pieces(about)], **head)
+    return _filled(
+        "report.html",
+        blocks,
+        title=case.headline,
+        state=state,
+        equations=equations_of(next(case.curves(0, 1)).problem.system),
+        about=[*_pieces(about(case))],
+        facts={**facts_of(case, started), **facts},
+        file=file,
+        more=more,
+    )
 
 
 def part_of_page(blocks: Iterable[Block]) -> str:
