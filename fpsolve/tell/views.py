@@ -28,7 +28,7 @@ from fpsolve.results.nodes import Nodes
 from fpsolve.solve.chart import Chart, begun_lines, solve_chart
 from fpsolve.solve.question import Numerics
 from fpsolve.tell.blocks import Column, Drawing, Grid, Sentence
-from fpsolve.tell.chart import show
+from fpsolve.tell.chart import NAMED, show
 from fpsolve.tell.local import Answer
 from fpsolve.tell.reports import part_of_page
 from fpsolve.tell.text import sampled
@@ -37,10 +37,8 @@ PIXELS = 144, 72
 """Of a picture, each way."""
 SHOWN = 9, 5
 """Rows and columns of its table."""
-PATHS, POINTS, PERIODS = 10, 400, 12
-"""Paths, points of each, and half-turns of the motion that is shown."""
-NAMED = 0.02
-"""Share of the frame from which on a region is named."""
+PATHS, POINTS = 10, 400
+"""Paths, and points of each; the motion is shown for as many steps."""
 
 
 def refusal(failure: ValidationError, fields: Mapping[str, FieldInfo]) -> FpsolveError:
@@ -170,11 +168,10 @@ def paths_of(case: Case) -> Answer:
             advance(motion, h, y, xi, log_norm, push, np.zeros(2), count, RENORMALISED, rng)
 
     long = max(1, round(64 * known.transient() / h / POINTS))
-    near = max(1, round(PERIODS * known.half_turn / h / POINTS)) if math.isfinite(known.half_turn) else 1
     with Meter(math.inf).running():
         time, logs, _ = zip(*followed(long), strict=True)
         log_norm[:] = 0.0
-        short, _, first = zip(*followed(near), strict=True)
+        short, _, first = zip(*followed(1), strict=True)
     if not (np.all(np.isfinite(logs)) and np.all(np.isfinite(first))):
         raise FpsolveError("the paths leave the range of numbers; take a weaker noise")
     has_wall = any(abs(math.cos(jump.phase)) < 1e-12 for jump in system.jumps)  # at x = 0
