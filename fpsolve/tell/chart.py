@@ -54,20 +54,22 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):
             scale_axis(axis, side.scale, (side.start, side.stop))
         small = {} if chart.regions is None else _shade(axes, chart.regions, frame)
-        names = {name: name for name, _ in SPECIAL.values()}
-        closed = "closed form, Eqs. (38)-(39), in the colour of its line"
         for i, line in enumerate(chart.lines):
             words = ": ".join(filter(None, (line.target.latex, appears(line.target))))
             for branch in line.branches:
                 axes.plot(*branch.path, color=f"C{i}", label=words)
                 words = ""
-                for start, (name, marker) in SPECIAL.items():
-                    if (chosen := np.array([start in label for label in branch.labels])).any():
-                        places = branch.x[chosen], branch.y[chosen]
-                        axes.plot(*places, marker, color=f"C{i}", markerfacecolor="white", label=names.pop(name, ""))
+                for start, (_, marker) in SPECIAL.items():
+                    chosen = np.array([start in label for label in branch.labels])
+                    axes.plot(branch.x[chosen], branch.y[chosen], marker, color=f"C{i}", markerfacecolor="white")
             for points in chart.closed_forms[i]:
-                axes.plot(*points.T, ":", color=f"C{i}", zorder=3, label=closed)
-                closed = ""
+                axes.plot(*points.T, ":", color=f"C{i}", zorder=3)
+        if any(chart.closed_forms):
+            axes.plot([], [], ":", color="0.35", label="closed form, Eqs. (38)-(39), in the colour of its line")
+        labels = " ".join(label for line in chart.lines for branch in line.branches for label in branch.labels)
+        for start, (name, marker) in SPECIAL.items():
+            if start in labels:
+                axes.plot([], [], marker, color="0.35", markerfacecolor="none", label=name)
         for name, letter in small.items():
             axes.plot([], [], " ", label=f"{letter}: {name}")
 

@@ -288,17 +288,15 @@ def _draw_few(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[Colo
 def _draw_many(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[ColorType]:
     """Thin lines and a bar of their colours, of which none is too pale on white; the colours."""
     from matplotlib import colormaps, rcParams
-    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
-    from matplotlib.colors import ListedColormap, LogNorm, Normalize
+    from matplotlib.colors import ListedColormap
 
     key, values = coloured_by([item.varied for item in series])
-    is_log = scale_of(values) == "log"
-    dark = ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256)))
-    scale = ScalarMappable((LogNorm if is_log else Normalize)(values.min(), values.max()), dark)
-    colours = scale.to_rgba(values)
-    thin, paths = 0.6 * rcParams["lines.linewidth"], [item.path for item in series]
-    axes.add_collection(LineCollection(paths, colors=colours, linewidths=thin, rasterized=len(series) > MOST_VECTORS))
+    scale, paths = scale_of(values), [item.path for item in series]
+    lines = LineCollection(paths, array=values, norm=scale, rasterized=len(series) > MOST_VECTORS)
+    lines.set(cmap=ListedColormap(colormaps["viridis"](np.linspace(0, 0.93, 256))))
+    thin, colours = 0.6 * rcParams["lines.linewidth"], lines.to_rgba(values)
+    axes.add_collection(lines).set_linewidth(thin)
     axes.plot([], [], color="0.35", linewidth=thin, label=case.method.name)
     for path, colour in zip(paths, colours, strict=True):
         known = path[np.isfinite(path[:, 1])]
@@ -306,8 +304,8 @@ def _draw_many(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[Col
             axes.plot(*known.T, "o", color=colour)
     axes.autoscale_view()
     words = "number of the curve" if key is None else label_of(case.about(key).attributes, 36)
-    bar = axes.figure.colorbar(scale, ax=axes, pad=0.02, label=words)
-    if is_log:
+    bar = axes.figure.colorbar(lines, ax=axes, pad=0.02, label=words)
+    if scale == "log":
         plain_numbers(bar.ax.yaxis)
     return list(colours)
 
@@ -353,7 +351,8 @@ def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Axes) -> No
         axes.plot([], [], "--", color=_BETWEEN, label="zero, interpolated between the values")
     if failed.any():
         cells = axes.pcolor(*edges, np.ma.masked_where(~failed, failed), cmap=ListedColormap(["white"]))
-        cells.set(hatch="/////", edgecolor="0.45", linewidth=0, label="failed or not solved")
+        cells.set(hatch="/////", edgecolor="0.45", linewidth=0)
+        axes.fill([], [], facecolor="white", edgecolor="0.45", hatch="/////", label="failed or not solved")
     if (np.isnan(values) & ~failed).any():
         sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
         axes.set_facecolor("0.8")
