@@ -120,11 +120,10 @@ def _draw_over_noise(pair: PrincipalPair, field: str, cmap: str, time_unit: str,
 
 def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -> None:
     """A line over φ for each value of the noise, with a gap where the function jumps."""
-    phi = np.pad(nodes.phi, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
+    blocks = nodes.phi[..., None], values.reshape(*nodes.phi.shape, -1)
+    phi, shown = (np.pad(each, ((0, 0), (0, 1), (0, 0)), constant_values=math.nan) for each in blocks)
     for number, xi in enumerate(nodes.xi):
-        blocks = values[:, number].reshape(nodes.phi.shape)
-        padded = np.pad(blocks, ((0, 0), (0, 1)), constant_values=math.nan).ravel()
-        axes.plot(phi, padded, label=rf"$\xi$ = {xi:g}")
+        axes.plot(phi.ravel(), shown[..., number].ravel(), label=rf"$\xi$ = {xi:g}")
     axes.set_xlim(0, 2 * math.pi)
     if is_log:
         axes.set_yscale("log")

@@ -10,7 +10,6 @@ from fpsolve.case.case import Case
 from fpsolve.results.columns import table_of
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
-from fpsolve.solve.questions import BY_NAME
 from fpsolve.tell import curves
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
@@ -79,8 +78,7 @@ def write_figures(
     main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
-    of_first, of_others = (any(BY_NAME[name].asked(case, number) is not None for name in FIGURES) for number in (1, 2))
-    for result in results if of_others else results[:1] if of_first else ():
+    for result in results:
         for figure in figures_of(case, result, folder, samples.get(result.curve.number)):
             figure.write(folder)
 
