@@ -32,11 +32,16 @@ class Page:
         self.shown, self.host, self.name = shown, shown.address.removeprefix("http://"), name
         self.knobs = {each["key"]: each for each in self.ask("start")["knobs"]}
 
-    def sent(self, method, path, body=None, **headers):
-        """The code of the answer, its text and its headers."""
+    def asked(self, method, path, body=None, **headers):
+        """A connection on which an answer will come."""
         connection = http.client.HTTPConnection(self.host)
         headers = {"Host": self.host, "Origin": self.shown.address, "Content-Type": "application/json"} | headers
         connection.request(method, path, body, {key: value for key, value in headers.items() if value})
+        return connection
+
+    def sent(self, *question, **headers):
+        """The code of the answer, its text and its headers."""
+        connection = self.asked(*question, **headers)
         answer = connection.getresponse()
         text = answer.read().decode()
         connection.close()
@@ -137,18 +142,15 @@ def test_map_shows_its_grid_as_it_comes_and_ends_where_the_page_asks_for_that(na
         ("systems/telegraph", "map", False),
         ("systems/coupled_ou", "solve", False),
         ("systems/coupled_ou", "solve", True),
-        pytest.param("strong", "map", True, marks=pytest.mark.slow),
     ],
 )
 def test_page_that_is_closed_ends_what_it_waits_for(name, kind, is_told):
     """By what it sends when it is closed, or as its connection is."""
     with page_of(name) as page:
+        values, before = {key: knob["value"] for key, knob in page.knobs.items()}, threading.active_count()
         axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in [*page.knobs][-2:]]
-        before, connection = threading.active_count(), http.client.HTTPConnection(page.host)
-        own = {"Host": page.host, "Origin": page.shown.address, "Content-Type": "application/json"}
-        values = {key: knob["value"] for key, knob in page.knobs.items()}
         question = {"page": page.name, "number": 1, "values": values, "axes": axes}
-        connection.request("POST", f"/{kind}", json.dumps(question), own)
+        connection = page.asked("POST", f"/{kind}", json.dumps(question))
         while "waits" not in page.ask("listen", 2):
             time.sleep(0.01)
         if is_told:
@@ -216,13 +218,10 @@ def test_sliders_go_as_far_as_the_case_or_the_parameter_says(fig1):
         assert page.ask("start")["axes"] == ["oscillator.omega", "noise.D0"]
 
 
-def test_pictures_name_the_unit_of_time_of_the_case(tmp_path):
-    text = (CASES / "fig1.toml").read_text(encoding="utf-8")
-    (tmp_path / "case.toml").write_text(f'{text}\n[units]\ntime = "s"\n', encoding="utf-8")
-    with page_of(tmp_path / "case.toml") as page:
+def test_pictures_name_the_unit_of_time_of_the_case():
+    with page_of(load_case(CASES / "fig1.toml", ["units.time='s'"])) as page:
         start, field, paths = page.ask("start"), page.told("field", {}, p=1.0), page.told("paths", {})
-    assert (start["time"], start["unit"]) == ("time (s)", "1/s")
-    assert [each["names"][1] for each in field["panels"]] == ["noise ξ (1/s)"] * 2
+    assert (start["time"], field["panels"][1]["names"][1]) == ("time (s)", "noise ξ (1/s)")
     assert field["panels"][1]["title"] == "stationary density (s/rad)"
     assert "ln‖x‖/t (1/s)" in paths["told"]
 
