@@ -52,8 +52,10 @@ class Page:
 
     def told(self, name, changed, number=2, **more):
         """The answer to a question with these values of sliders, beside those of the case."""
-        values = {key: knob["value"] for key, knob in self.knobs.items()} | changed
-        return self.ask(name, number, values=values, **more)
+        return self.ask(name, number, values=self.values() | changed, **more)
+
+    def values(self):
+        return {key: knob["value"] for key, knob in self.knobs.items()}
 
 
 @contextmanager
@@ -147,9 +149,8 @@ def test_map_shows_its_grid_as_it_comes_and_ends_where_the_page_asks_for_that(na
 def test_page_that_is_closed_ends_what_it_waits_for(name, kind, is_told):
     """By what it sends when it is closed, or as its connection is."""
     with page_of(name) as page:
-        values, before = {key: knob["value"] for key, knob in page.knobs.items()}, threading.active_count()
-        axes = [{"key": key, "start": 0.05, "stop": 1.0} for key in [*page.knobs][-2:]]
-        question = {"page": page.name, "number": 1, "values": values, "axes": axes}
+        before, axes = threading.active_count(), [{"key": key, "start": 0.1, "stop": 1.0} for key in [*page.knobs][-2:]]
+        question = {"page": page.name, "number": 1, "values": page.values(), "axes": axes}
         connection = page.asked("POST", f"/{kind}", json.dumps(question))
         while "waits" not in page.ask("listen", 2):
             time.sleep(0.01)
@@ -190,9 +191,9 @@ def test_bad_question_is_refused_with_the_sentences_of_cases(fig1, changed, ques
 
 
 def test_newer_question_of_a_page_ends_an_older_one_and_none_of_another_page(fig1):
-    other = Page(fig1.shown, "b")
-    fig1.ask("stop", 10)
-    assert fig1.told("solve", {}, 9) == {"stopped": True}
+    own, other = (Page(fig1.shown, name) for name in "bc")
+    own.ask("stop", 10)
+    assert own.told("solve", {}, 9) == {"stopped": True}
     assert "curve" in other.told("move", {})
 
 
