@@ -12,7 +12,6 @@ import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from textwrap import TextWrapper, fill
 from typing import TYPE_CHECKING, Any, Literal
@@ -89,17 +88,6 @@ def canvas_of(ax: Axes | None) -> Iterator[Axes]:
         new = figure.subplots()
         new.tick_params(labelsize=pyplot.rcParams["font.size"])  # which later ticks would take from another style
         yield new
-
-
-@contextmanager
-def canvas_into(content: BytesIO) -> Iterator[Axes]:
-    """The axes of a figure that belongs to no window, and becomes a PNG."""
-    from matplotlib.figure import Figure
-
-    with styled():
-        figure = Figure(layout="constrained")
-        yield figure.add_subplot()
-        figure.savefig(content, format="png", dpi=150)
 
 
 @contextmanager

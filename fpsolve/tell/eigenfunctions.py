@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.data import Quantity
-from fpsolve.drawing import MOST_LINES, QUARTERS, canvas_into, draw_colours, label_axes
+from fpsolve.drawing import MOST_LINES, QUARTERS, draw_colours, figure_for, label_axes
 from fpsolve.exponent.density import Grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.model.quantity import MOMENT, PHASE
 from fpsolve.results.nodes import FIELDS, Nodes
-from fpsolve.results.vtk import parameter_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,19 +72,20 @@ def draw_eigenfunction(
     """
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
-    problem, content = pair.generator.problem, BytesIO()
-    known = {key: each._replace(quantity=each.quantity.timed(time_unit)) for key, each in problem.parameters.items()}
-    with canvas_into(content) as axes:
-        if choose(problem).pictures == DIRECTIONS:
-            found = on_nodes(pair)
-            values = found.fields._asdict()[field]
-            found.grid.draw(axes, values, _about(field, found.grid, time_unit).attributes, cmap=cmap)
-        else:
-            _draw_over_noise(pair, field, cmap, time_unit, axes)
-        number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g}"
-        axes.figure.suptitle(f"{number} ({MOMENT.timed(time_unit).unit})", parse_math=False)
-        axes.set_title("\n".join(parameter_lines(known)), fontsize=9, parse_math=False)
-    return Picture(content.getvalue())
+    problem = pair.generator.problem
+    number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g} ({MOMENT.timed(time_unit).unit})"
+    known = [each.quantity.timed(time_unit).stated(each.value) for each in problem.parameters.values()]
+    with TemporaryDirectory() as place:
+        path = Path(place, "picture.png")
+        with figure_for([path], number, known) as figure:
+            axes = figure.add_subplot()
+            if choose(problem).pictures == DIRECTIONS:
+                found = on_nodes(pair)
+                about = _about(field, found.grid, time_unit).attributes
+                found.grid.draw(axes, found.fields._asdict()[field], about, cmap=cmap)
+            else:
+                _draw_over_noise(pair, field, cmap, time_unit, axes)
+        return Picture(path.read_bytes())
 
 
 def _about(field: str, grid: Grid, time_unit: str) -> Quantity:
@@ -122,12 +122,11 @@ def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -
     """A line over φ for each value of the noise, with a gap where the function jumps."""
     blocks = nodes.phi[..., None], values.reshape(*nodes.phi.shape, -1)
     phi, shown = (np.pad(each, ((0, 0), (0, 1), (0, 0)), constant_values=math.nan) for each in blocks)
+    is_named = 1 < nodes.xi.size <= MOST_LINES
     for number, xi in enumerate(nodes.xi):
-        axes.plot(phi.ravel(), shown[..., number].ravel(), label=rf"$\xi$ = {xi:g}")
+        axes.plot(phi.ravel(), shown[..., number].ravel(), label=rf"$\xi$ = {xi:g}" if is_named else None)
     axes.set_xlim(0, 2 * math.pi)
     if is_log:
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    if 1 < nodes.xi.size <= MOST_LINES:
-        axes.legend()
