@@ -42,6 +42,8 @@ def _draw_response(simulated: SimulatedCurve, time_unit: str, paths: Sequence[Pa
         of, timed = simulated.response.about, partial(Quantity.timed, unit=time_unit)
         simulated.response.plot(plane)
         simulated.response.plot_amplitude(radial)
+        if inside := radial.get_legend():
+            inside.remove()  # as it stands below
         label_axes(plane, timed(of.first).attributes, timed(of.second).attributes)
         label_axes(radial, timed(of.amplitude).attributes, timed(of.amplitude_density).attributes)
         figure.axes[-1].set_ylabel(label_of(timed(of.density).attributes, 36))  # of the colour bar
