@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
 from fpsolve.analysis.target import said
-from fpsolve.arrays import shown
+from fpsolve.arrays import FloatArray, shown
 from fpsolve.model.faults import TableError, strict_dataclass
 from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem, checked_problem
@@ -65,13 +66,14 @@ class Axis:
                 known = f"must be from start = {self.start} to stop = {self.stop}; remove it, or widen the frame"
                 raise TableError(f"got {value}; {known}", "at", i)
 
-    def value(self, share: Any) -> Any:
+    def value(self, share: ArrayLike) -> FloatArray:
         """The parameter at a share of the way from start to stop."""
         if self.scale == "log":
             value = self.start * (self.stop / self.start) ** np.asarray(share)
         else:
             value = self.start + (self.stop - self.start) * np.asarray(share)
-        return np.clip(value, self.start, self.stop)[()]
+        found: FloatArray = np.clip(value, self.start, self.stop)[()]
+        return found
 
     def share(self, value: float) -> float:
         """The inverse of `value`."""
@@ -96,7 +98,7 @@ def bounds_of(problem: Problem, key: str) -> tuple[float, float]:
     return low, high
 
 
-def check_key(problem: Problem, key: Any) -> None:
+def check_key(problem: Problem, key: object) -> None:
     """Refuse what is no key of a parameter by which Λ can be differentiated. Raises `ValueError`."""
     known = checked_problem(problem).differentiable
     if key not in known:

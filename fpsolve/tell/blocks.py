@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -50,9 +50,11 @@ class Grid:
     remark: str = ""
 
 
-def filled(title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]], remark: str = "") -> Grid:
-    """A table of those columns that have any entry."""
-    kept = [i for i in range(len(columns)) if any(row[i] for row in rows)]
+def filled(
+    title: str, columns: Sequence[Column], rows: Sequence[Sequence[str]], remark: str = "", keep: Container[str] = ()
+) -> Grid:
+    """A table of those columns that have any entry, or a heading that is to be kept."""
+    kept = [i for i, column in enumerate(columns) if column.heading in keep or any(row[i] for row in rows)]
     return Grid(title, [columns[i] for i in kept], [[row[i] for i in kept] for row in rows], remark=remark)
 
 

@@ -91,7 +91,9 @@ def _shade(axes: Axes, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, 
         fitting = ("\n".join(lines) for lines in (parts, folded) if _has_room(regions.index == number, each.at, lines))
         if not (words := next(fitting, "")) and each.share > NAMED:
             words = small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
-        text = axes.text(x.value(each.at[0]), y.value(each.at[1]), words, fontsize="small", ha="center", va="center")
+        text = axes.text(
+            float(x.value(each.at[0])), float(y.value(each.at[1])), words, fontsize="small", ha="center", va="center"
+        )
         text.set(color="0.15", zorder=4)
         text.set_bbox({"facecolor": tint, "edgecolor": "none", "pad": 1.5, "alpha": 0.85})  # over closed forms
     return small

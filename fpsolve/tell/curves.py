@@ -126,7 +126,7 @@ def grid_of(
         varied = [written(each) for each in found[place].curve.varied.values()]
         rows.append([*zip(keys, varied, strict=True), *cells(found[place]), (which, ", ".join(told))])
     columns = [column for column, _ in rows[0]] if rows else []
-    return filled(case.headline, columns, [[text for _, text in row] for row in rows])
+    return filled(case.headline, columns, [[text for _, text in row] for row in rows], keep=numbers)
 
 
 def _told_moments(case: Case) -> list[float]:
