@@ -18,12 +18,12 @@ from fpsolve.errors import WorkersDied
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.results.columns import COUNTS
+from fpsolve.results.csv_json import GROWING, TABLES, Writer, facts_of
 from fpsolve.results.eigenfunctions import write_curves
 from fpsolve.results.files import FILES
 from fpsolve.results.known import Results, record_of
 from fpsolve.results.response import write_response
-from fpsolve.results.tables import GROWING, TABLES, Writer, facts_of
+from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import Status
 from fpsolve.solve.question import Job
 from fpsolve.solve.questions import BY_NAME

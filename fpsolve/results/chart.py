@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.files import write_csv, write_json
-from fpsolve.results.tables import head
+from fpsolve.results.csv_json import head
 from fpsolve.solve.chart import Chart, appears, charted
 
 FILES = "chart.csv", "chart.json"

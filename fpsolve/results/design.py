@@ -11,7 +11,7 @@ import tomlkit
 from fpsolve.case.case import Case
 from fpsolve.case.rewrite import rewritten
 from fpsolve.files import write_json, write_text
-from fpsolve.results.tables import head
+from fpsolve.results.csv_json import head
 from fpsolve.solve.design import DesignOutcome
 
 

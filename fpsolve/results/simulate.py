@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from fpsolve.case.case import Case
 from fpsolve.files import write_csv, write_json
-from fpsolve.results.tables import head, parameters_of
+from fpsolve.results.csv_json import head, parameters_of
 from fpsolve.results.vtk import field_data, pyvista_module, write_vtk
 from fpsolve.solve.curve import SimulatedCurve
 

@@ -217,7 +217,7 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        numbers: dict[Quantity, Any] = {each: getattr(found, name) for name, each in OVER_P.items()}
+        numbers: dict[Quantity, Any] = {each: vars(found)[name] for name, each in OVER_P.items()}
         for name, each in self.estimates.items():
             if each:
                 numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}

@@ -40,7 +40,7 @@ def _unclear(found: Densities) -> Iterator[Message]:
     """Which densities mislead."""
     p = found.pair.p
     for name in ("T_adjoint", "tilted_density"):
-        defect = found.grid.negative_share(getattr(found.fields, name))
+        defect = found.grid.negative_share(found.fields._asdict()[name])
         if defect > MOST_NEGATIVE:
             yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
     if not found.missing <= RESOLVED:

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from fpsolve.case.case import Case, Curve
-from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, STABILITY_INDEX, Index
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.question import Job, Numerics, Question, Reason, Settings
+from fpsolve.solve.question import Job, Numbers, Numerics, Question, Reason, Settings, estimated
 
 
 def question_of(index: Index) -> Question:
     """The question for an index."""
-    error, by_theory = index.error(), index.perturbation
+    by_theory = index.perturbation
 
     def asked(case: Case, number: int) -> Settings | None:
         return {} if index.name in case.asked else None
@@ -45,13 +43,12 @@ def question_of(index: Index) -> Question:
                 remedy=None if numerics.solver(curve.problem).method.adapts else Remedy.MESH,
             )
 
-    def numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    def numbers(case: Case, result: CurveResult | None) -> Numbers:
         if index.name not in case.asked:
             return {}
-        found = result and result.estimates[index.name]
+        found = result.estimates[index.name] if result else None
         theory: Mapping[str, float] = result.parts.get("theory", {}) if result and found else {}
-        value = {index: found and found.value, error: found and found.error_estimate}
-        return {**value, by_theory: theory.get(index.name)}
+        return {**estimated(index, found), by_theory: theory.get(index.name)}
 
     return Question(index.name, asked, solve, Estimate, index.symbol, said=said, numbers=numbers)
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import OF_MOMENTS
-from fpsolve.data import Quantity
 from fpsolve.exponent.error import Failure, InvariantClass, Moment
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, OVER_P
 from fpsolve.solve.curve import CurveResult, MomentColumns
-from fpsolve.solve.question import UNFINISHED, Job, Numerics, Question, Settings
+from fpsolve.solve.question import UNFINISHED, Job, Numbers, Numerics, Question, Settings
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 
@@ -80,9 +78,9 @@ def _solve(job: Job, settings: Settings) -> Moments:
     )
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
-    of_p = OVER_P if MOMENT.name in case.asked else {}
-    return {each: result and getattr(result.moments, name) for name, each in of_p.items()}
+def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+    known = vars(result.moments) if result else {}
+    return {each: known.get(name) for name, each in OVER_P.items()} if MOMENT.name in case.asked else {}
 
 
 QUESTION: Question = Question(

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from fpsolve.case.case import Case
-from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, RATE_FUNCTION
 from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.question import Question
+from fpsolve.solve.question import Numbers, Question
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+def _numbers(case: Case, result: CurveResult | None) -> Numbers:
     is_asked = {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked}
-    return {RATE_FUNCTION: result and result.moments.rate_function} if is_asked else {}
+    return {RATE_FUNCTION: result.moments.rate_function if result else None} if is_asked else {}
 
 
 QUESTION: Question = Question(RATE_FUNCTION.name, numbers=_numbers, names=r"rate_function\.(png|pdf)")

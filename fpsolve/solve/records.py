@@ -142,12 +142,12 @@ def key_of(*content: Any) -> str:
     return sha256(json.dumps([__version__, *content], sort_keys=True, default=packed).encode()).hexdigest()[:32]
 
 
-def plain(kind: Any, value: Any) -> Any:
+def plain(kind: object, value: object) -> Any:
     """A value with an annotation as data that a record can hold."""
     return _form(kind).dump_python(value, warnings=False)
 
 
-def made(kind: Any, data: Any) -> Any:
+def made(kind: object, data: object) -> Any:
     """The value with an annotation of what `plain` gave. Raises `ValueError` where that has another form."""
     return _form(kind).validate_python(data)
 

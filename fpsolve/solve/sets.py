@@ -61,7 +61,7 @@ def solve_curve(job: Job) -> Job:
     return job
 
 
-def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry:
+def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry[object]:
     """What became of a question."""
     if isinstance(found, Reason):
         return Entry(None, found, seconds, ANEW if _may_pass(found.message) else job.numerics.limit)

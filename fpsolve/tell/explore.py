@@ -38,7 +38,7 @@ from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
-from fpsolve.results.tables import facts_of
+from fpsolve.results.csv_json import facts_of
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import Job, Numerics, fault
 from fpsolve.solve.sets import everything, result_of, solve_curve
