@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
@@ -67,7 +67,7 @@ Field = Callable[[FloatArray], Sample]
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class Scan(ReadOnly):
     """F on a grid of the square, or on a row of it.
 
     Attributes:

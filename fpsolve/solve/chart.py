@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
+from contourpy import contour_generator
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions, regions
@@ -105,8 +107,8 @@ def dear_lines(case: Case) -> Message | None:
 def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
     frame, problem = charted(case), case.problem
-    own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
-    return [untraced(target, frame.x, frame.y, problem, **own) for target in frame.lines]
+    own = partial(untraced, step=frame.step, nodes=frame.nodes, budget=case.budget)
+    return [own(target, frame.x, frame.y, problem) for target in frame.lines]
 
 
 def solve_chart(
@@ -143,26 +145,23 @@ def _closed_forms(
     problem: Problem, targets: Sequence[Target], axes: tuple[Axis, Axis]
 ) -> tuple[tuple[FloatArray, ...], ...]:
     """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
-    from contourpy import contour_generator
+    shares, (x, y) = np.linspace(0, 1, CLOSED_FORM_NODES), axes
 
-    shares = np.linspace(0, 1, CLOSED_FORM_NODES)
-    x, y = axes
-    linear, quadratic = np.full((2, shares.size, shares.size), np.nan)
-    for i, u in enumerate(shares):
-        for j, v in enumerate(shares):
-            try:
-                here = problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))})
-                theory = second_order(here)
-            except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
-                continue
-            linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
-    found = []
-    for target in targets:
-        ratio = linear + target.order * quadratic
-        values = np.ma.masked_invalid((target.p or 1.0) * ratio - target.level)
-        lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
-        found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
-    return tuple(found)
+    def theory(u: float, v: float) -> tuple[float, float]:
+        try:
+            found = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
+        except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
+            return math.nan, math.nan
+        return found.lyapunov_exponent, found.quadratic
+
+    linear, quadratic = np.moveaxis(np.array([[theory(u, v) for u in shares] for v in shares]), -1, 0)
+
+    def lines(target: Target) -> tuple[FloatArray, ...]:
+        values = (target.p or 1.0) * (linear + target.order * quadratic) - target.level
+        found: list[FloatArray] = contour_generator(shares, shares, np.ma.masked_invalid(values)).lines(0.0)  # type: ignore[assignment]
+        return tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in found)
+
+    return tuple(map(lines, targets))
 
 
 def key_of_line(case: Case, line: Boundary) -> str:
@@ -182,14 +181,14 @@ def recalled(records: Records, key: str, line: Boundary) -> Boundary:
         name = str(at.tolist())
         if name not in known:
             known[name] = found = solve(at)
-            if not (isinstance(found, Message) and may_pass(found)):
+            if not (isinstance(found, Message) and _may_pass(found)):
                 records.put(key, {name: plain(POINT, found)})
         return known[name]
 
     return replace(line, recall=recall)
 
 
-def may_pass(reason: Message) -> bool:
+def _may_pass(reason: Message) -> bool:
     """Whether a reason may be gone the next time, so that it is not recorded."""
     return reason.tells_of(Code.NO_MEMORY) or reason.tells_of(Code.SECONDS_SPENT) or is_of_line(reason)
 
@@ -199,12 +198,11 @@ def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iter
     rows = {
         row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
     }
-
-    def keeps(scan: Scan) -> bool:
-        return not any(map(may_pass, scan.reasons))
-
-    found = answered(records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__, keeps=keeps)
-    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in found)
+    how = answered(
+        records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__,
+        keeps=lambda scan: not any(map(_may_pass, scan.reasons)),
+    )  # fmt: skip
+    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in how)
 
 
 def appears(target: Target) -> str | None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.case.case import Curve
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
@@ -49,20 +49,20 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class MomentColumns:
+class MomentColumns(ReadOnly):
     """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
 
     Attributes:
         p: the moments.
-        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
+        value, derivative, derivative_error, error_estimate, residual: as in `MomentLyapunov`.
         perturbation: Eq. (37) at the same p.
     """
 
     p: FloatArray
     value: FloatArray
     derivative: FloatArray
-    error_estimate: FloatArray
     derivative_error: FloatArray
+    error_estimate: FloatArray
     residual: FloatArray
     perturbation: FloatArray
 
@@ -77,7 +77,7 @@ NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseDensity:
+class ResponseDensity(ReadOnly):
     """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
 
     Attributes:

@@ -47,14 +47,13 @@ class Records:
         self._end = b""
         if is_fresh:
             path.unlink(missing_ok=True)
-        if path.exists():
-            with path.open("rb") as file:
-                start = 0
-                for line in file:
-                    if found := _parsed(line):
-                        self._starts.setdefault(found[0], []).append(start)
-                    start += len(line)
-                    self._end = b"" if line.endswith(b"\n") else b"\n"
+        with suppress(FileNotFoundError), path.open("rb") as file:
+            start = 0
+            for line in file:
+                if found := _parsed(line):
+                    self._starts.setdefault(found[0], []).append(start)
+                start += len(line)
+                self._end = b"" if line.endswith(b"\n") else b"\n"
 
     def __bool__(self) -> bool:
         return bool(self._starts)
@@ -122,19 +121,20 @@ def answered(
         key: what the record of an item is found by.
         keeps: whether something that was found is recorded.
     """
-    by_key, earlier, new = [(key(each), each) for each in items], dict[str, Found](), dict[str, Found]()
-    for name in dict(by_key):
+    named, known = [(key(each), each) for each in items], dict[str, Found]()
+    for name in dict(named):
         with suppress(ValueError):
-            if found := made(kind | None, records.get(name).get("found")):
-                earlier[name] = found
-    fresh = pool.run(task, [item for name, item in dict(by_key).items() if name not in earlier])
-    for name, item in by_key:
-        while name not in earlier and name not in new:
+            if found := made(kind, records.get(name).get("found")):
+                known[name] = found
+    earlier, left = {*known}, {name: item for name, item in named if name not in known}
+    fresh = pool.run(task, left.values())
+    for name, item in named:
+        while name not in known:
             each, one = next(fresh)
-            new[key(each)] = one
+            known[key(each)] = one
             if keeps(one):
-                records.put(key(each), {"found": plain(kind | None, one)})
-        yield item, earlier.get(name) or new[name], name in earlier
+                records.put(key(each), {"found": plain(kind, one)})
+        yield item, known[name], name in earlier
 
 
 def key_of(*content: Any) -> str:
@@ -154,8 +154,8 @@ def made(kind: object, data: object) -> Any:
 
 @cache
 def _form(kind: Any) -> TypeAdapter[Any]:
-    """What writes and reads the values with an annotation that is no class by itself, such as `Estimate | None`."""
-    return TypeAdapter(kind, config=ConfigDict(arbitrary_types_allowed=True, extra="forbid"))
+    """What writes and reads the values with an annotation, or None."""
+    return TypeAdapter(kind | None, config=ConfigDict(arbitrary_types_allowed=True, extra="forbid"))
 
 
 def packed(array: FloatArray) -> Entries | float:
@@ -171,4 +171,4 @@ def unpacked(found: Entries) -> Entries | FloatArray:
     if found.keys() != {"shape", "data"}:
         return found
     data = zlib.decompress(b64decode(found["data"]))
-    return np.frombuffer(data, dtype="<f8").reshape(found["shape"]).astype(float)
+    return np.frombuffer(data, dtype="<f8").reshape(found["shape"])

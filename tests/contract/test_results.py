@@ -160,6 +160,13 @@ def test_a_missing_number_says_why():
     assert still._repr_html_().startswith("<p>none: ")
 
 
+def test_nobody_writes_into_the_arrays_of_results(results):
+    holders = [*results.values(), results["curve"].moments, *results["boundary"].branches]
+    named = [pair for holder in holders for pair in vars(holder).items() if isinstance(pair[1], np.ndarray)]
+    assert len(named) > 30
+    assert [name for name, each in named if each.flags.writeable] == []
+
+
 def same(found, name, values, error=None):
     np.testing.assert_array_equal(found[name], values)
     if error is not None:
