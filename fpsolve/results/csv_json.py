@@ -123,6 +123,11 @@ def with_error(name: str, found: Estimate | None) -> Content:
     return {name: found and found.value, f"{name}_error": found and found.error_estimate}
 
 
+def sampled(value: float, error: float | None) -> Content:
+    """A number and its standard error in JSON."""
+    return {"value": value, "standard_error": error}
+
+
 def _beyond(case: Case, result: CurveResult) -> Content:
     """What no table has of a curve, by its name; None where it is asked for and not there."""
     found = Content()

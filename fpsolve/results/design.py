@@ -36,7 +36,7 @@ def summary(case: Case, outcome: DesignOutcome, facts: Mapping[str, Any]) -> dic
         "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
         "by": [
             {
-                **{name: getattr(axis, name) for name in ("key", "start", "stop", "scale")},
+                **{name: vars(axis)[name] for name in ("key", "start", "stop", "scale")},
                 "unit": outcome.units[axis.key],
                 "before": before[axis.key],
                 "after": changed[axis.key].value if found else None,

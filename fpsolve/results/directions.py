@@ -18,7 +18,7 @@ from fpsolve.exponent.density import Densities, DirectionGrid
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.results.nodes import FIELDS
-from fpsolve.results.vtk import Facts, field_data, write_between, write_series
+from fpsolve.results.vtk import Facts, facts_of_curve, write_between, write_series
 
 ERROR = Quantity(
     "density_error",
@@ -61,7 +61,7 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
             numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
     for name, quantity in FIELDS.items():
         about = replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)
-        numbers[about] = np.stack([getattr(each.fields, name) for each in shown])
+        numbers[about] = np.stack([each.fields._asdict()[name] for each in shown])
     numbers[ERROR] = np.array([each.error for each in shown])
     numbers[MOMENT] = np.array([each.value for each in shown])
     for mean in grid.means(shown[0].fields.tilted_density):
@@ -86,9 +86,9 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     """
     found = on_one_grid(found)
     write_densities(found, curve, folder)
-    grid, problem = found[0].grid, curve.problem
-    facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
-    facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    grid = found[0].grid
+    along = {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    facts = {**facts_of_curve(curve), **along}
     stationary, others = [each for each in found if not each.pair.p], [each for each in found if each.pair.p]
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     always = dict[str, FloatArray]()

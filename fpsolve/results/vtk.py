@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Curve
 from fpsolve.data import written
 from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
@@ -33,6 +34,11 @@ def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> 
     named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
     numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
     return numbers | named | {name: text.replace("²", "^2") for name, text in words.items() if text}
+
+
+def facts_of_curve(curve: Curve) -> Facts:
+    """The field data of a curve: its number, and its parameters."""
+    return field_data({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)
 
 
 def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
