@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -59,14 +58,14 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
         if not each.pair.p:
             numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.T_adjoint
             numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
-    for name, quantity in FIELDS.items():
-        about = replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)
-        numbers[about] = np.stack([each.fields._asdict()[name] for each in shown])
+    fields = np.stack([each.fields for each in shown], axis=1)
+    for (name, quantity), values in zip(FIELDS.items(), fields, strict=True):
+        numbers[replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)] = values
     numbers[ERROR] = np.array([each.error for each in shown])
     numbers[MOMENT] = np.array([each.value for each in shown])
-    for mean in grid.means(shown[0].fields.tilted_density):
-        values = [grid.means(each.fields.tilted_density)[mean] for each in shown]
-        numbers[replace(mean, dims=("p",))] = np.array(values)
+    means = [grid.means(each.fields.tilted_density) for each in shown]
+    for mean in means[0]:
+        numbers[replace(mean, dims=("p",))] = np.array([each[mean] for each in means])
     places = {P: np.array([each.pair.p for each in shown]), **grid.coordinates}
     if grid.share:
         places[grid.share] = np.sin(grid.first) ** 2
@@ -103,9 +102,7 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
         _write_plane(path, grid, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
 
     if others:
-        write_series(
-            folder, f"eigenfunctions{curve.suffix}", {each.pair.p: partial(write, each=each) for each in others}
-        )
+        write_series(folder, f"eigenfunctions{curve.suffix}", {each.pair.p: each for each in others}, write)
 
 
 def _plain(axis: Quantity) -> str:

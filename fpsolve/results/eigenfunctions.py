@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -78,7 +77,7 @@ def write_eigenfunctions(
         data = {**grid.fields(pair)._asdict(), "stationary_density": density, "z": grid.z}
         _write_grid(path, grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
 
-    return write_series(directory, stem, {pair.p: partial(write, pair=pair) for pair in pairs})
+    return write_series(directory, stem, {pair.p: pair for pair in pairs}, write)
 
 
 def write_density(
@@ -118,10 +117,13 @@ def write_curves(case: Case, folder: Path) -> None:
     if case.planned == 1 or not there:
         return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
-    if len(keys) == 1 and not case.vary.is_text(keys[0]):
-        entries = [(float(curve.varied[keys[0]]), name, f"{curve.label}, p = {p:g}") for curve, name in there]
-    else:
-        entries = [(float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}") for each, name in there]
+    is_number = len(keys) == 1 and not case.vary.is_text(keys[0])
+    entries = [
+        (float(each.varied[keys[0]]), name, f"{each.label}, p = {p:g}")
+        if is_number
+        else (float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}")
+        for each, name in there
+    ]
     write_text(folder / CURVES, collection_of(sorted(entries)))
 
 

@@ -12,8 +12,6 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.discretisation import QUESTION as DISCRETISATION
-from fpsolve.solve.discretisation import largest_of
 from fpsolve.solve.moments import QUESTION as MOMENTS
 from fpsolve.solve.question import Asked, Job, Numerics
 from fpsolve.solve.questions import BY_NAME
@@ -44,8 +42,6 @@ def record_of(job: Job) -> Entries:
         limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
         known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
         record |= {f"{names[ROW]} {p!r}": (row, limit) for p, row in known}
-    if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
-        record[f"{names[MOMENTS.name]} largest"] = largest
     return record
 
 
@@ -56,9 +52,6 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             entry = made(BY_NAME[name].entry, record[names[name]])
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
-    with suppress(ValueError, KeyError):
-        p, facts = record[f"{names[MOMENTS.name]} largest"]
-        job.largest = p, facts
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError):
             row, limit = record[f"{names[ROW]} {p!r}"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -20,6 +20,7 @@ from fpsolve.signals import signals_held
 
 LINE = 90
 """Largest number of letters of a line of parameters."""
+Shown = TypeVar("Shown")
 Facts = Mapping[str, Any]
 """Field data by their names."""
 
@@ -76,6 +77,15 @@ def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, A
     write_points(path, pyvista.UnstructuredGrid({kind: np.stack(corners, axis=1)}, points), data, facts)
 
 
+def nodes_of_quadrilateral(degree: int) -> Sequence[tuple[int, int]]:
+    """The places of the nodes of a Lagrange quadrilateral along its sides, in VTK's order."""
+    from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
+
+    number: Any = vtkLagrangeQuadrilateral.PointIndexFromIJK
+    places = [(i, j) for i in range(degree + 1) for j in range(degree + 1)]
+    return sorted(places, key=lambda place: number(*place, [degree, degree]))
+
+
 def write_points(path: Path, grid: Any, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file of a grid with point data, of which the first is shown first, and field data."""
     for name, values in data.items():
@@ -84,15 +94,17 @@ def write_points(path: Path, grid: Any, data: Mapping[str, FloatArray], facts: F
     write_vtk(path, grid, facts)
 
 
-def write_series(folder: Path, stem: str, by_p: Mapping[float, Callable[[Path], None]]) -> list[Path]:
-    """Write `<stem>.pvd`, a time series over p, and its file of each p.
+def write_series(
+    folder: Path, stem: str, by_p: Mapping[float, Shown], write: Callable[[Path, Shown], None]
+) -> list[Path]:
+    """Write `<stem>.pvd`, a time series over p, and by `write` the file of what is shown at each p.
 
     Returns:
         The files, the collection first.
     """
     names = {p: name_at(stem, p) for p in sorted(by_p)}
     for p, name in names.items():
-        by_p[p](folder / name)
+        write(folder / name, by_p[p])
     collection = folder / f"{stem}.pvd"
     write_text(collection, collection_of((p, name, "") for p, name in names.items()))
     return [collection, *(folder / name for name in names.values())]

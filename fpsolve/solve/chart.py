@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 from contourpy import contour_generator
 
-from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions, regions
 from fpsolve.analysis.scan import Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
@@ -22,7 +21,6 @@ from fpsolve.case.sections import ChartSection
 from fpsolve.errors import FpsolveError, NoPerturbationTheory
 from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message, message_of
-from fpsolve.model.problem import Problem
 from fpsolve.pool import Pool
 from fpsolve.solve.records import Records, answered, key_of, made, plain
 from fpsolve.theory.perturbation import second_order
@@ -112,40 +110,35 @@ def begun_lines(case: Case) -> list[Boundary]:
 
 
 def solve_chart(
-    case: Case,
     lines: Sequence[Boundary],
     rows: Iterator[Scan],
+    closed_forms: tuple[tuple[FloatArray, ...], ...] = (),
     *,
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
-    has_closed_forms: bool = True,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
     Args:
-        case: with a chart, see `refuse_no_chart`.
         lines: see `begun_lines`.
         rows: what `scan_row` gives for the `rows` of all lines, in order.
+        closed_forms: see `closed_forms_of`.
         progress: called once for each node of each scan.
         stepped: called once for each point that is traced.
-        has_closed_forms: whether they are found, too, which takes seconds.
     """
-    axes = lines[0].x, lines[0].y
-    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, axes) if has_closed_forms else ())
+    done: tuple[Boundary, ...] = ()
     for each in lines:
-        done = chart.lines
         for line in each.solve(rows, progress, stepped):
-            chart = replace(chart, lines=(*done, line))
-            yield chart
-    whole = tuple(crossed(chart.lines))
-    yield Chart(whole, chart.closed_forms, regions(whole), complete=all(line.complete for line in whole))
+            yield Chart((*done, line), closed_forms)
+        done = *done, line
+    whole = tuple(crossed(done))
+    yield Chart(whole, closed_forms, regions(whole), complete=all(line.complete for line in whole))
 
 
-def _closed_forms(
-    problem: Problem, targets: Sequence[Target], axes: tuple[Axis, Axis]
-) -> tuple[tuple[FloatArray, ...], ...]:
+def closed_forms_of(lines: Sequence[Boundary]) -> tuple[tuple[FloatArray, ...], ...]:
     """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
-    shares, (x, y) = np.linspace(0, 1, CLOSED_FORM_NODES), axes
+    problem, x, y = lines[0].problem, lines[0].x, lines[0].y
+    shares = np.linspace(0, 1, CLOSED_FORM_NODES)
 
     def theory(u: float, v: float) -> tuple[float, float]:
         try:
@@ -156,12 +149,12 @@ def _closed_forms(
 
     linear, quadratic = np.moveaxis(np.array([[theory(u, v) for u in shares] for v in shares]), -1, 0)
 
-    def lines(target: Target) -> tuple[FloatArray, ...]:
+    def branches(target: Target) -> tuple[FloatArray, ...]:
         values = (target.p or 1.0) * (linear + target.order * quadratic) - target.level
         found: list[FloatArray] = contour_generator(shares, shares, np.ma.masked_invalid(values)).lines(0.0)  # type: ignore[assignment]
         return tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in found)
 
-    return tuple(map(lines, targets))
+    return tuple(branches(line.target) for line in lines)
 
 
 def key_of_line(case: Case, line: Boundary) -> str:

@@ -14,7 +14,7 @@ from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.case.case import Curve
-from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SAME, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.error import Estimate, Failure, InvariantClass
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
@@ -139,27 +139,35 @@ class CurveResult(Result):
     Attributes:
         curve: the parameters, the oscillator and the noise.
         moments: Λ(p); where some p failed, of the others.
-        estimates: of each of the `INDICES`, by its name; None where there is none, it was not asked for, or it did not
-            converge.
-        discretisation: what was used for the p of the largest size; None where no p was solved.
+        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
-        classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
-        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 
     curve: Curve
     moments: MomentColumns
-    estimates: Mapping[str, Estimate | None]
-    discretisation: dict[str, Any] | None = None
+    parts: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[Message, ...] = ()
     notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
-    classes: tuple[InvariantClass, ...] = ()
-    parts: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+
+    @property
+    def estimates(self) -> Mapping[str, Estimate | None]:
+        """Of each of the `INDICES`, by its name; None where there is none, it was not asked for, or not found."""
+        return {name: self.parts.get(name) for name in INDICES}
+
+    @property
+    def classes(self) -> tuple[InvariantClass, ...]:
+        """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""
+        return self.parts.get("classes", ())
+
+    @property
+    def discretisation(self) -> dict[str, Any] | None:
+        """What was used for the p of the largest size; None where no p was solved."""
+        return self.parts.get("discretisation") or None
 
     @property
     def excursion(self) -> Excursion | None:
@@ -179,21 +187,21 @@ class CurveResult(Result):
     @property
     def lyapunov_exponent(self) -> Estimate | None:
         """λ."""
-        return self.estimates[LYAPUNOV_EXPONENT.name]
+        return self.parts.get(LYAPUNOV_EXPONENT.name)
 
     @property
     def stability_index(self) -> Estimate | None:
         """δ_p."""
-        return self.estimates[STABILITY_INDEX.name]
+        return self.parts.get(STABILITY_INDEX.name)
 
     @property
     def variance_rate(self) -> Estimate | None:
         """Λ″(0)."""
-        return self.estimates[VARIANCE_RATE.name]
+        return self.parts.get(VARIANCE_RATE.name)
 
     def moment(self, p: float) -> Estimate | None:
         """Λ at one p; None where it is not known."""
-        for place in np.flatnonzero(self.moments.p == p).tolist():
+        for place in np.flatnonzero(np.isclose(self.moments.p, p, rtol=0, atol=SAME)).tolist():
             value, error = self.moments.value[place], self.moments.error_estimate[place]
             return Estimate(float(value), float(error), 0.0, quantity=moment_at(p))
         return None

@@ -12,7 +12,7 @@ from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.exponent.error import Failure, InvariantClass, Moment
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import MOMENT, OVER_P
+from fpsolve.model.quantity import MOMENT, OVER_P, RATE_FUNCTION
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import UNFINISHED, Job, Numbers, Numerics, Question, Settings
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
@@ -76,6 +76,15 @@ QUESTION: Question = Question(
     lacks=lambda found, _: (each.reason for each in found.failures),
     numbers=_numbers,
 )
+
+
+def _rates(case: Case, result: CurveResult | None) -> Numbers:
+    is_asked = {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked}
+    return {RATE_FUNCTION: result.moments.rate_function if result else None} if is_asked else {}
+
+
+RATES: Question = Question(RATE_FUNCTION.name, numbers=_rates, names=r"rate_function\.(png|pdf)")
+"""I(s) = ps − Λ(p) at s = Λ′(p), which follows from Λ(p)."""
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:

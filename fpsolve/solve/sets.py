@@ -21,8 +21,8 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.solve.curve import NO_MOMENTS, CurveResult
-from fpsolve.solve.moments import CLASSES, Moments
 from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.moments import Moments
 from fpsolve.solve.question import UNFINISHED, Asked, Entry, Job, Limit, Question, Reason, attempt
 from fpsolve.solve.questions import BY_NAME, QUESTIONS
 
@@ -93,7 +93,7 @@ def result_of(job: Job) -> CurveResult:
     curve, asked, entries = job.curve, job.asked, job.entries
     if (entry := entries.get(MOMENTS.name)) and entry.reason:
         reason = Failure(None, entry.reason.message)
-        return CurveResult(curve, NO_MOMENTS, dict.fromkeys(INDICES), failures=(reason,))
+        return CurveResult(curve, NO_MOMENTS, failures=(reason,))
     known = {name: entry.found for name, entry in entries.items() if name in asked and entry.found is not None}
     moments: Moments = known.get(MOMENTS.name, Moments())
     said: dict[Severity, list[Message]] = {each: [] for each in Severity}
@@ -112,19 +112,12 @@ def result_of(job: Job) -> CurveResult:
     return CurveResult(
         curve=curve,
         moments=job.columns,
-        estimates={name: known.get(name) for name in INDICES},
-        discretisation=known.get("discretisation") or None,
+        parts=known,
         warnings=tuple(said[Severity.WARNING]),
         notes=tuple(said[Severity.NOTE]),
         failures=failures if is_whole else (*failures, Failure(None, UNFINISHED)),
-        classes=known.get(CLASSES.name, ()),
-        parts={name: found for name, found in known.items() if name not in _OWN},
         seconds=sum(entry.seconds for name, entry in entries.items() if name in asked),
     )
-
-
-_OWN = {MOMENTS.name, *INDICES, CLASSES.name, "discretisation"}
-"""Names of questions that have attributes of their own in a result."""
 
 
 def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failure]) -> Iterator[Message]:
@@ -139,13 +132,13 @@ def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failu
     failing = Code.INDEX_MISSING if failures else Code.INDEX_FAILED
     groups = dict[tuple[Code, Message, str], list[str]]()
     for question, reason in reasons:
-        message, code = reason.message, codes.get(reason.kind, failing)
-        if question.name in _OWN:
-            message = unsolved.get(message, message) if reason.kind == "failed" else message
-        elif message.severity is not Severity.FAILURE:
+        message, code, is_index = reason.message, codes.get(reason.kind, failing), question.name in INDICES
+        if is_index and reason.kind == "failed":
+            message = unsolved.get(message, message)
+        if is_index or message.severity is Severity.FAILURE:
+            group = "" if is_index else question.name
+            groups.setdefault((code, message, group), []).append(reason.symbol)
+        else:
             yield message
-            continue
-        group = "" if question.name in _OWN else question.name
-        groups.setdefault((code, message, group), []).append(reason.symbol)
     for (code, message, _), symbols in groups.items():
         yield Message(code, symbols=symbols, reason=message)
