@@ -19,8 +19,7 @@ from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.csv_json import GROWING, TABLES, Writer, facts_of
-from fpsolve.results.eigenfunctions import write_curves
-from fpsolve.results.files import FILES
+from fpsolve.results.eigenfunctions import FILES, write_curves
 from fpsolve.results.known import Results, record_of
 from fpsolve.results.response import write_response
 from fpsolve.results.table import COUNTS

@@ -9,18 +9,22 @@ Field data are numbers, as meshio refuses texts: a text is the codes of its lett
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.exponent.density import xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.files import write_text
+from fpsolve.results.directions import write_directions
 from fpsolve.results.nodes import Nodes
 from fpsolve.results.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
 from fpsolve.solve.eigenfunctions import Eigenfunctions
@@ -103,6 +107,13 @@ def write_density(
     known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative}
     _write_grid(path, grid, data, {**known, **field_data(parameters, varied, problem)})
     return path
+
+
+FILES: Mapping[str, Callable[[Any, Curve, Path], None]] = {
+    EIGENFUNCTIONS: write_pictures,
+    DIRECTIONS.part: write_directions,
+}
+"""Each writes what was found of a curve, and no record holds, into a folder, by the names of questions."""
 
 
 def write_curves(case: Case, folder: Path) -> None:

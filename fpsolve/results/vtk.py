@@ -141,7 +141,7 @@ def collection_of(entries: Iterable[tuple[float, str, str]]) -> str:
 
 
 def pyvista_module() -> Any:
-    """pyvista, which takes half a second. No signal interrupts the import of it and of VTK's writers."""
+    """pyvista, which takes 350 ms. No signal interrupts the import of it and of VTK's writers."""
     with signals_held():
         import pyvista
         import vtkmodules.vtkIOXML  # noqa: F401

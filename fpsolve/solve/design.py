@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.inverse import Design, axes_of, start_and_stop, units_of
@@ -39,7 +38,7 @@ class DesignOutcome:
         """Whether there is none, and that is known."""
         return self.reason is not None and self.reason.code is Code.UNREACHED
 
-    def expectation(self, case: Case) -> dict[str, Any] | None:
+    def expectation(self, case: Case) -> dict[str, object] | None:
         """What a case with these values expects, as its file states it; None where its p are others."""
         if self.found is None or (self.target.kind == "moment" and not case.moments.has(self.target.p)):
             return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ def _settings(case: Case, number: int) -> Settings:
     return {"p": max(case.p.tolist(), key=abs, default=0.0)}
 
 
-def _solve(job: Job, settings: Settings) -> dict[str, Any]:
+def _solve(job: Job, settings: Settings) -> dict[str, object]:
     """z in noise units; nothing where no p is by elements. The p is solved again where an earlier run had done that."""
     found, spaces = job.columns, job.solver.method.spaces
     has_pair = settings["p"] in found.p[np.isfinite(found.residual)]  # by elements
@@ -30,4 +29,4 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     return {**space.phi.facts, **space.xi.facts, "unknowns": space.size}
 
 
-QUESTION: Question = Question("discretisation", _settings, _solve, dict[str, Any])
+QUESTION: Question = Question("discretisation", _settings, _solve, dict[str, object])

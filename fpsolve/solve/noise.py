@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -94,11 +94,8 @@ class Wanted:
         return SIGNALS[self.of].noise_in
 
 
-class Critical(NamedTuple):
-    """A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
-
-    value: float
-    standard_error: float
+Critical = tuple[float, float]
+"""A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,8 +248,8 @@ def _critical(fit: NoiseFit, wanted: Wanted) -> tuple[Critical | None, Critical 
     def moment(at_double: float, at_zero: float) -> float:
         return weak_moment(2, omega, 0.0, at_double, at_zero, wanted.noise_in) / (2 * omega)
 
-    exponent = [weak_exponent(omega, 0.0, each, wanted.noise_in) / omega for each in (values[0], errors[0])]
-    return Critical(*exponent), Critical(moment(*values), math.hypot(moment(errors[0], 0.0), moment(0.0, errors[1])))
+    value, error = (weak_exponent(omega, 0.0, each, wanted.noise_in) / omega for each in (values[0], errors[0]))
+    return (value, error), (moment(*values), math.hypot(moment(errors[0], 0.0), moment(0.0, errors[1])))
 
 
 def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, FloatArray]:

@@ -36,7 +36,7 @@ def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Bud
         squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
         estimates = [Estimate(value, error, abs(value)) for value, error in squares]
         return CurveResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
-    from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
+    from fpsolve.nonlinear.response import stationary_response  # 390 ms
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
     return CurveResponse(

@@ -170,5 +170,5 @@ def _missing(outcome: NoiseOutcome) -> str:
 
 def _percent(each: Critical) -> str:
     """A damping ratio in percent with two digits of its error."""
-    value, error = 100 * each.value, 100 * each.standard_error
+    value, error = (100 * number for number in each)
     return f"({sampled(value, error)} ± {error:.1g}) %" if error else f"{value:.4g} %"
