@@ -157,7 +157,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
             with watch.bar(sweep.phase) as progress:
                 sweep.solve(pool, progress)
         except (KeyboardInterrupt, WorkersDied):
-            sweep.results.add_rest()
+            sweep.results.read(is_all=True)
             sweep.write_all()
             raise
         with watch.bar(Phase(case.name, "tables")), signals_held():

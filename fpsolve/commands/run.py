@@ -61,7 +61,7 @@ def run(
         if not (options.quiet or interruption):
             print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
-            print(summary_line(case, sweep.results, sweep.facts))
+            print(summary_line(sweep.results, sweep.facts))
         else:
             what = done_of(case, len(sweep.results), sweep.failed)
             options.print_written(case, what, sweep.facts["wall_seconds"], known_of(case, sweep.known))

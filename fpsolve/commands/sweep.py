@@ -162,7 +162,7 @@ class Sweep:
         """Write tables of all sets, the first one last."""
         started, self.facts = monotonic(), facts_of(self.case, self.started)
         for name, write in reversed(tables.items()):
-            write(self.case, self.results, self.folder / name, self.facts)
+            write(self.results, self.folder / name, self.facts)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:

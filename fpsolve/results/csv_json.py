@@ -28,6 +28,7 @@ from fpsolve.results.netcdf import write_dataset
 from fpsolve.results.table import plain
 from fpsolve.solve.curve import CurveResponse, CurveResult
 from fpsolve.solve.intervals import spreads_of
+from fpsolve.solve.moments import CLASSES
 
 Content = dict[str, object]
 """What JSON holds by its name."""
@@ -52,45 +53,47 @@ def facts_of(case: Case, started: datetime) -> Content:
     }
 
 
-def write_moments(case: Case, results: Results, path: Path, facts: Content) -> None:
+def write_moments(results: Results, path: Path, facts: Content) -> None:
     """Write the numbers of all sets at each p that was solved."""
-    table, sets = results.table, case.vary.sets
+    table, vary = results.table, results.case.vary
     names = [name for name, each in table.items() if each.quantity.dims]
-    rows = ([*sets[each - 1].values(), *row.values()] for each in results.numbers for row in table.over_p(each))
-    write_csv(path, [*case.vary.keys, "p", *names], rows)
+    rows = ([*vary.sets[each - 1].values(), *row.values()] for each in results.numbers for row in table.over_p(each))
+    write_csv(path, [*vary.keys, "p", *names], rows)
 
 
-def write_curves(case: Case, results: Results, path: Path, facts: Content) -> None:
+def write_curves(results: Results, path: Path, facts: Content) -> None:
     """Write the numbers of all sets that are no function of p, and the messages."""
-    table, sets = results.table, case.vary.sets
+    table, vary = results.table, results.case.vary
     names = [name for name, each in table.items() if not each.quantity.dims]
-    rows = ([*sets[each - 1].values(), *table.row(each).values(), table.messages[each - 1]] for each in results.numbers)
-    write_csv(path, [*case.vary.keys, *names, "messages"], rows)
+    rows = (
+        [*vary.sets[each - 1].values(), *table.row(each).values(), table.messages[each - 1]] for each in results.numbers
+    )
+    write_csv(path, [*vary.keys, *names, "messages"], rows)
 
 
-def write_summary(case: Case, results: Results, path: Path, facts: Content) -> None:
+def write_summary(results: Results, path: Path, facts: Content) -> None:
     """Write all that is known of all sets, unless there are many."""
-    if case.planned > MOST_SUMMARISED:
+    if results.case.planned > MOST_SUMMARISED:
         path.unlink(missing_ok=True)
     else:
-        write_json(path, summary(case, results, facts))
+        write_json(path, summary(results, facts))
 
 
-Writer = Callable[[Case, Results, Path, Content], None]
+Writer = Callable[[Results, Path, Content], None]
 GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_curves, "moments.csv": write_moments}
 """What writes each of the files with numbers of all sets while a run grows; the first says whether all are there."""
 TABLES: dict[str, Writer] = GROWING | {"results.nc": write_dataset}
 """What writes all files with numbers of all sets at the end, and takes the `facts_of` the run."""
 
 
-def summary_line(case: Case, results: Results, facts: Content) -> str:
+def summary_line(results: Results, facts: Content) -> str:
     """What summary.json has of few sets, in one line."""
-    return json.dumps(summary(case, results, facts), allow_nan=False, ensure_ascii=False)
+    return json.dumps(summary(results, facts), allow_nan=False, ensure_ascii=False)
 
 
-def summary(case: Case, results: Results, facts: Content) -> Content:
+def summary(results: Results, facts: Content) -> Content:
     """Whether all sets are there, and of each the numbers of the table, those that no table has, and the messages."""
-    done, table = len(results.whole), results.table
+    case, done, table = results.case, len(results.whole), results.table
     curves = [
         {
             **parameters_of(each.curve),
@@ -131,8 +134,8 @@ def sampled(value: float, error: float | None) -> Content:
 def _beyond(case: Case, result: CurveResult) -> Content:
     """What no table has of a curve, by its name; None where it is asked for and not there."""
     found = Content()
-    if result.classes:
-        found["classes"] = [_class(each) for each in result.classes]
+    if classes := result.parts.get(CLASSES.name):
+        found[CLASSES.name] = [_class(each) for each in classes]
     if EXCURSIONS in case.asked:
         found[EXCURSIONS] = result.excursion and _excursion(case, result.excursion)
     if case.has_response:
@@ -173,10 +176,11 @@ def _excursion(case: Case, found: Excursion) -> Content:
     return {
         "start": {"phi": found.phi, "xi": found.xi},
         "is_certain": found.is_certain,
-        **with_error("stability_index", found.stability_index),
-        **with_error("lower", found.lower),
-        **with_error("upper", found.upper),
-        **with_error("upcrossings", found.upcrossings),
+        **{
+            key: number
+            for name in ("stability_index", "lower", "upper", "upcrossings")
+            for key, number in with_error(name, vars(found)[name]).items()
+        },
         "levels": [
             {"level": level, "least_probable": low, "most_probable": high, "upcrossings": plain(count)}
             for level, low, high, count in rows

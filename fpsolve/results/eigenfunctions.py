@@ -13,7 +13,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
@@ -109,7 +108,7 @@ def write_density(
     return path
 
 
-FILES: Mapping[str, Callable[[Any, Curve, Path], None]] = {
+FILES: Mapping[str, Callable[..., None]] = {
     EIGENFUNCTIONS: write_pictures,
     DIRECTIONS.part: write_directions,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from typing import overload
+from typing import Any
 
 import numpy as np
 
@@ -68,25 +68,24 @@ class Results(Sequence[CurveResult]):
         records: those of its folder.
 
     Attributes:
+        case: the same.
         asked: what is asked of the first curve, and of each other one.
         table: the numbers and messages of all that are known.
         whole: the numbers of the curves of which all is known that is asked for.
     """
 
     def __init__(self, case: Case, records: Records) -> None:
-        self._case, self._records, self._numerics = case, records, Numerics.of(case)
+        self.case, self._records, self._numerics = case, records, Numerics.of(case)
         self.asked = everything(case, 1), everything(case, 2)
         self._names = [names_of(each, self._numerics) for each in self.asked]
         self.table, self.whole = Table(case), set[int]()
         self._kept: dict[int, CurveResult] = {}
-        for job in self._jobs():
-            if job.is_whole:
-                self.add(job)
+        self.read()
 
     def job(self, number: int, *, is_all: bool = False) -> Job:
         """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
-        vary, place = self._case.vary, number > 1
-        curve = Curve(self._case.problem, vary.sets[number - 1], number)
+        vary, place = self.case.vary, number > 1
+        curve = Curve(self.case.problem, vary.sets[number - 1], number)
         job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
         return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
 
@@ -105,15 +104,13 @@ class Results(Sequence[CurveResult]):
         self._records.put(curve.digest, record)
         return self.add(self.job(curve.number, is_all=True))
 
-    def add_rest(self) -> None:
-        """Take in what is known of the sets that are not finished."""
-        for job in self._jobs(is_all=True):
-            if job.entries or job.rows:
+    def read(self, *, is_all: bool = False) -> None:
+        """Take in what records hold of the sets that are finished, or of all."""
+        left = {*range(1, self.case.planned + 1)}.difference(self.numbers) if self._records else ()
+        for number in sorted(left):
+            job = self.job(number, is_all=is_all)
+            if job.is_whole or (is_all and (job.entries or job.rows)):
                 self.add(job)
-
-    def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
-        left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
-        return (self.job(number, is_all=is_all) for number in sorted(left))
 
     @property
     def numbers(self) -> list[int]:
@@ -135,11 +132,6 @@ class Results(Sequence[CurveResult]):
     def __iter__(self) -> Iterator[CurveResult]:
         return map(self.of, self.numbers)
 
-    @overload
-    def __getitem__(self, index: int) -> CurveResult: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[CurveResult]: ...
-    def __getitem__(self, index: int | slice) -> CurveResult | list[CurveResult]:
-        if isinstance(index, slice):
-            return [*map(self.of, self.numbers[index])]
-        return self.of(self.numbers[index])
+    def __getitem__(self, index: Any) -> Any:
+        numbers = self.numbers[index]
+        return [*map(self.of, numbers)] if isinstance(index, slice) else self.of(numbers)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
 from fpsolve.files import atomic
@@ -36,7 +35,7 @@ ROW = "row"
 MESSAGES = Quantity("messages", "messages", "what is said of the parameter set")
 
 
-def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, object]) -> None:
+def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> None:
     """Write the table of all sets, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
     There is a dimension for each varied key, or `set` for those of a list, and p.
@@ -51,7 +50,8 @@ def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, 
     import h5netcdf  # 50 ms, with h5py
     import h5py
 
-    table, vary, text = results.table, case.vary, h5py.string_dtype()
+    case, table, text = results.case, results.table, h5py.string_dtype()
+    vary = case.vary
     is_list = bool(vary) and vary.mode != "product"
     sizes = {SET: case.planned} if is_list else {key: len(vary.values(key)) for key in vary.keys}
     shape, beside = tuple(sizes.values()), {"coordinates": " ".join(vary.keys)} if is_list else {}

@@ -12,8 +12,7 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
-from fpsolve.solve.curve import CurveResult, Status
-from fpsolve.solve.question import Number
+from fpsolve.solve.curve import CurveResult, Number, Status
 from fpsolve.solve.questions import QUESTIONS
 
 Cell = str | float | None

@@ -32,9 +32,9 @@ def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> 
         "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in varied),
         "held": "\n".join(parameter_lines(known, varied)),
     }
-    named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
-    numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
-    return numbers | named | {name: text.replace("²", "^2") for name, text in words.items() if text}
+    stated = {f"{key} = {each}" if isinstance(each, str) else key: each for key, each in parameters.items()}
+    numbers = {name: 1.0 if isinstance(each, str) else each for name, each in stated.items()}
+    return numbers | {name: text.replace("²", "^2") for name, text in words.items() if text}
 
 
 def facts_of_curve(curve: Curve) -> Facts:

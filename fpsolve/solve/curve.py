@@ -16,7 +16,7 @@ from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.case.case import Curve
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SAME, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.exponent.error import Estimate, Failure, InvariantClass
+from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
@@ -70,6 +70,15 @@ class MomentColumns(ReadOnly):
     def rate_function(self) -> FloatArray:
         """I(s) = ps − Λ(p) at s = Λ′(p), shape (n,); its error is, to first order, that of Λ(p)."""
         return np.asarray(self.p * self.derivative - self.value) + 0.0
+
+
+Number = float | FloatArray | None
+"""What a quantity is of one curve, or at each of its p; None where there is none."""
+
+
+def estimated(quantity: Quantity, estimate: Estimate | None) -> dict[Quantity, Number]:
+    """A number and its error by their quantities; None where there is none."""
+    return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
 NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
@@ -160,11 +169,6 @@ class CurveResult(Result):
         return {name: self.parts.get(name) for name in INDICES}
 
     @property
-    def classes(self) -> tuple[InvariantClass, ...]:
-        """λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it."""
-        return self.parts.get("classes", ())
-
-    @property
     def discretisation(self) -> dict[str, Any] | None:
         """What was used for the p of the largest size; None where no p was solved."""
         return self.parts.get("discretisation") or None
@@ -225,10 +229,9 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        numbers: dict[Quantity, Any] = {each: vars(found)[name] for name, each in OVER_P.items()}
+        numbers: dict[Quantity, Number] = {each: vars(found)[name] for name, each in OVER_P.items()}
         for name, each in self.estimates.items():
-            if each:
-                numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}
+            numbers |= estimated(INDICES[name], each) if each else {}
         title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), {P: found.p}
         more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
         return dataset(title, "finite elements", numbers, places, self.curve.parameters, **more)

@@ -83,12 +83,10 @@ def wanted_of(
         for i, key in enumerate(by):
             if start and stop:
                 ranges.append(Axis(key, start[i], stop[i]))
-            elif key not in problem.differentiable:
-                ranges.append(key)  # which is refused
-            elif (usual := start_and_stop(problem, key)) is None:
-                raise ValueError(f"{key} is 0, so that its range must be stated; write --from and --to")
-            else:
+            elif key in problem.differentiable and (usual := start_and_stop(problem, key)):
                 ranges.append(Axis(key, start[i] if start else usual.start, stop[i] if stop else usual.stop))
+            else:
+                ranges.append(key)  # which is refused
         return target, axes_of(problem, ranges)
     except ValueError as failure:
         raise FpsolveError(f"{case.path}: {failure}") from None

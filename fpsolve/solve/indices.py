@@ -9,8 +9,8 @@ from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, STABILITY_INDEX, Index
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.question import Job, Numbers, Numerics, Question, Reason, Settings, estimated
+from fpsolve.solve.curve import CurveResult, estimated
+from fpsolve.solve.question import Job, Numbers, Numerics, Question, Reason, Settings
 
 
 def question_of(index: Index) -> Question:

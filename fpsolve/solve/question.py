@@ -15,12 +15,10 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.budget import Meter
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
@@ -28,7 +26,7 @@ from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.signals import is_interrupt
-from fpsolve.solve.curve import CurveResult, MomentColumns
+from fpsolve.solve.curve import CurveResult, MomentColumns, Number
 
 Settings = Mapping[str, Any]
 """What is asked by a question, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
@@ -36,7 +34,6 @@ Asked = Mapping[str, Settings]
 """What is asked of a curve, by the names of questions."""
 Limit = tuple[float, float]
 """Unknowns and seconds of a budget."""
-Number = float | FloatArray | None
 Numbers = Mapping[Quantity, Number]
 """Those of a curve by their quantities, and their errors by those of these; None where there is none."""
 Found = TypeVar("Found")
@@ -208,11 +205,6 @@ class Job:
         if monotonic() - self._kept_at >= SOON:
             self.keep(self)
             self._kept_at = monotonic()
-
-
-def estimated(quantity: Quantity, estimate: Estimate | None) -> dict[Quantity, Number]:
-    """A number and its error by their quantities; None where there is none."""
-    return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from fpsolve.exponent.forced import stationary_moments
 from fpsolve.exponent.method import Budget
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity
-from fpsolve.solve.question import Job, Numbers, Question, Settings, estimated
+from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity, estimated
+from fpsolve.solve.question import Job, Numbers, Question, Settings
 
 if TYPE_CHECKING:
     from fpsolve.nonlinear.response import StationaryResponse
