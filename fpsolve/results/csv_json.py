@@ -22,7 +22,7 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate, InvariantClass
 from fpsolve.files import write_csv, write_json
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.results.known import Results
 from fpsolve.results.netcdf import write_dataset
 from fpsolve.results.table import plain
@@ -97,7 +97,7 @@ def summary(results: Results, facts: Content) -> Content:
     curves = [
         {
             **parameters_of(each.curve),
-            **({"moments": table.over_p(each.curve.number)} if MOMENT.name in case.asked else {}),
+            **({"moments": table.over_p(each.curve.number)} if table.p.size else {}),
             **table.row(each.curve.number),
             "discretisation": each.discretisation,
             **_beyond(case, each),

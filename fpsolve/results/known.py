@@ -12,6 +12,8 @@ from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.discretisation import QUESTION as DISCRETISATION
+from fpsolve.solve.discretisation import largest_of
 from fpsolve.solve.moments import QUESTION as MOMENTS
 from fpsolve.solve.question import Asked, Job, Numerics
 from fpsolve.solve.questions import BY_NAME
@@ -38,10 +40,13 @@ def record_of(job: Job) -> Entries:
     """The entries of what was solved now of a set, and of each p."""
     names = names_of(job.asked, job.numerics)
     record = Entries({names[name]: plain(BY_NAME[name].entry, each) for name, each in job.new.items()})
-    if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
-        limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
-        known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
-        record |= {f"{names[ROW]} {p!r}": (row, limit) for p, row in known}
+    moments = job.new.get(MOMENTS.name)
+    if moments or MOMENTS.name not in job.entries:
+        limit = moments.limit if moments else job.numerics.limit
+        asked = job.asked[MOMENTS.name]["p"]
+        record |= {f"{names[ROW]} {p!r}": (job.rows[p], limit) for p in asked if p in job.rows}
+    if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
+        record[f"{names[MOMENTS.name]} largest"] = largest
     return record
 
 
@@ -52,6 +57,9 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
             entry = made(BY_NAME[name].entry, record[names[name]])
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
+    with suppress(ValueError, KeyError):
+        p, facts = record[f"{names[MOMENTS.name]} largest"]
+        job.largest = p, facts
     for p in job.asked[MOMENTS.name]["p"]:
         with suppress(ValueError, KeyError):
             row, limit = record[f"{names[ROW]} {p!r}"]

@@ -147,6 +147,7 @@ class Job:
         entries: what became of them, by their names; those that are there are not solved again.
         rows: Λ(p) by p, see `MomentColumns`; those that are there are not solved again.
         new: the entries that were solved now.
+        largest: the p of the largest size that an earlier run has solved by elements, and what it was solved on.
         pictures: what is drawn and not recorded, by the names of questions.
         progress: called after each moment.
         keep: takes the job now and then, see `SOON`.
@@ -159,6 +160,7 @@ class Job:
     entries: dict[str, Entry[Any]] = field(default_factory=dict)
     rows: dict[float, Sequence[float]] = field(default_factory=dict)
     new: dict[str, Entry[Any]] = field(default_factory=dict)
+    largest: tuple[float, dict[str, object]] | None = None
     pictures: dict[str, Any] = field(default_factory=dict)
     progress: Callable[[], None] = idle
     keep: Callable[[Job], None] = idle

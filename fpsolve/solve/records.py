@@ -10,12 +10,10 @@ compressed text; nan and inf, which JSON has not, are words as Python writes the
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from errno import ENOSPC
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -74,20 +72,16 @@ class Records:
         """Add entries, on a line of their own also where the last one is torn.
 
         Raises:
-            OSError: they cannot be written; nothing is left of them.
+            OSError: they cannot be written; what is left of them is a torn line, which is none.
         """
         content = json.dumps(entries, ensure_ascii=False, default=packed).encode()
         line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("ab", buffering=0) as file:
-            start = file.seek(0, os.SEEK_END)
-            try:
-                if file.write(self._end + line) < len(self._end + line):
-                    raise OSError(ENOSPC, os.strerror(ENOSPC), str(self.path))
-            except OSError:
-                file.truncate(start)
-                raise
-        self._starts.setdefault(key, []).append(start + len(self._end))
+        end, self._end = self._end, b"\n"
+        with self.path.open("ab") as file:
+            start = file.tell() + file.write(end)
+            file.write(line)
+        self._starts.setdefault(key, []).append(start)
         self._end = b""
 
 

@@ -63,17 +63,18 @@ def solve_curve(job: Job) -> Job:
 
 def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry[object]:
     """What became of a question."""
-    if isinstance(found, Reason):
-        return Entry(None, found, seconds, ANEW if _may_pass(found.message) else job.numerics.limit)
-    said, lacking = question.said(found, job.curve, job.numerics), [*question.lacks(found, job.asked[question.name])]
-    lacking += [each for each in said if each.severity is not Severity.NOTE]
-    limit = job.numerics.limit if lacking else None
-    return Entry(found, None, seconds, ANEW if any(map(_may_pass, lacking)) else limit)
-
-
-def _may_pass(message: Message) -> bool:
-    """Whether a reason may be gone the next time."""
-    return message.tells_of(Code.NO_MEMORY) or message.tells_of(Code.FAULT)
+    reason = found if isinstance(found, Reason) else None
+    if reason:
+        doubts = [reason.message]
+    else:
+        said = question.said(found, job.curve, job.numerics)
+        doubts = [
+            *question.lacks(found, job.asked[question.name]),
+            *(each for each in said if each.severity is not Severity.NOTE),
+        ]
+    may_pass = any(each.tells_of(code) for each in doubts for code in (Code.NO_MEMORY, Code.FAULT))
+    limit = ANEW if may_pass else job.numerics.limit if doubts else None
+    return Entry(None if reason else found, reason, seconds, limit)
 
 
 def solve_set(job: Job) -> Job:
