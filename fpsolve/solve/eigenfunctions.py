@@ -57,10 +57,9 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The pairs that converge, that at p = 0 if it is to be trusted; what is said of them."""
     found = [attempt(partial(job.solver.pair, p), EIGENFUNCTIONS) for p in (*without_failed(job, settings["p"]), 0.0)]
     *pairs, stationary = (None if isinstance(each, Reason) else each for each in found)
-    known = tuple(each for each in pairs if each is not None)
-    said = list[Message]()
+    known, said = tuple(filter(None, pairs)), list[Message]()
     try:
-        if stationary is not None:
+        if stationary:
             stationary_density(stationary)
     except NotConverged as failure:
         stationary = None

@@ -38,9 +38,8 @@ def everything(case: Case, number: int = 1) -> Asked:
 
 def solve_curve(job: Job) -> Job:
     """Solve what is not known of a parameter set, one after the other; what is missing is an entry with its reason."""
-    planned = [each for each in QUESTIONS if each.symbol and each.name in job.asked]
     p = job.asked[MOMENTS.name]["p"]
-    job.meter.planned = len(p) + len(planned)
+    job.meter.planned = len(p) + sum(bool(BY_NAME[name].symbol) for name in job.asked)
     with job.meter.running():
         if MOMENTS.name not in job.entries:  # moments of even order take little
             attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)

@@ -175,7 +175,7 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
 
 
 def test_many_curves_have_no_summary(tmp_path, monkeypatch):
-    """All is in curves.csv and results.nc; the next command still knows whose files these are."""
+    """All is in curves.csv and results.nc."""
     asked = ["run", "case.toml", "--quiet", "--jobs", "1", "--set", "output={ figure=false, quantities=['moment'] }"]
     place = tmp_path / "results/case/summary.json"
     assert run(tmp_path, *asked, case=TEXT).code == 0
@@ -187,10 +187,6 @@ def test_many_curves_have_no_summary(tmp_path, monkeypatch):
     assert not place.exists()
     found = open_results(place.parent)
     assert (found.attrs["complete"], found.messages.values[::3].tolist()) == (1, told)
-    simulated = ["simulate", "case.toml", "--quiet", "--paths", "32", "--time", "20"]
-    for sets, is_kept in ([], True), (["--set", "noise.tau0=0.6"], False):
-        run(tmp_path, *simulated, *sets)
-        assert place.with_name("results.nc").exists() == is_kept
 
 
 @pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left on device"), OSError("encoder error")])
