@@ -161,9 +161,8 @@ def test_a_missing_number_says_why():
 
 
 def test_nobody_writes_into_the_arrays_of_results(results):
-    holders = [*results.values(), results["curve"].moments]
-    arrays = [each for holder in holders for each in vars(holder).values() if isinstance(each, np.ndarray)]
-    assert {each.flags.writeable for each in arrays} == {False}
+    found = [each for result in (*results.values(), results["curve"].moments) for each in vars(result).values()]
+    assert {each.flags.writeable for each in found if isinstance(each, np.ndarray)} == {False}
 
 
 def same(found, name, values, error=None):

@@ -416,8 +416,8 @@ sigma = 3.0
 @pytest.mark.slow
 def test_response_of_equations_has_the_names_of_their_variables_and_agrees_with_paths(tmp_path):
     [curve] = curves(tmp_path, CUBIC, "--monte-carlo")
-    folder, start = tmp_path / "results/case", "response_"
-    means = {name.removeprefix(start): each for name, each in curve.items() if name.startswith(start)}
+    folder = tmp_path / "results/case"
+    means = {name.removeprefix("response_"): each for name, each in curve.items() if name.startswith("response_")}
     assert {"response.png", "response.pdf", "figure.png"} <= files(folder)
     names = ["amplitude", "amplitude_squared", "amplitude_fourth", "q_squared", "w_squared"]
     assert [*means] == [f"{name}{end}" for name in names for end in ("", "_error")]
