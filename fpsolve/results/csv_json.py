@@ -61,7 +61,7 @@ def write_moments(results: Results, path: Path, facts: Content) -> None:
     write_csv(path, [*vary.keys, "p", *names], rows)
 
 
-def write_curves(results: Results, path: Path, facts: Content) -> None:
+def write_numbers(results: Results, path: Path, facts: Content) -> None:
     """Write the numbers of all sets that are no function of p, and the messages."""
     table, vary = results.table, results.case.vary
     names = [name for name, each in table.items() if not each.quantity.dims]
@@ -80,7 +80,7 @@ def write_summary(results: Results, path: Path, facts: Content) -> None:
 
 
 Writer = Callable[[Results, Path, Content], None]
-GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_curves, "moments.csv": write_moments}
+GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_numbers, "moments.csv": write_moments}
 """What writes each of the files with numbers of all sets while a run grows; the first says whether all are there."""
 TABLES: dict[str, Writer] = GROWING | {"results.nc": write_dataset}
 """What writes all files with numbers of all sets at the end, and takes the `facts_of` the run."""
