@@ -9,20 +9,19 @@ from itertools import chain
 from pathlib import Path
 
 from fpsolve.case.case import Case, load_case
-from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
+from fpsolve.commands.interrupts import saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.commands.sweep import Sweep
-from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
+from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
-from fpsolve.results.folders import SIMULATED, SOLVED, own_folder
+from fpsolve.results.folders import own_folder, written_by
 from fpsolve.results.simulate import SIMULATION
 from fpsolve.results.tables import TABLES
-from fpsolve.signals import signals_held
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.simulate import refuse_obstacles
-from fpsolve.tell import solved as results
+from fpsolve.tell import solved
 from fpsolve.tell.notes import MONTE_CARLO, notes
 from fpsolve.tell.progress import SILENT, Phase, Watch, ignore
 from fpsolve.tell.reports import shown_at_the_end, write_report
@@ -73,17 +72,17 @@ def run(
         NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
     read = case if isinstance(case, Case) else load_case(case)
-    pool = cluster(scheduler) if scheduler else parallel(jobs, read.planned)
+    pool = cluster(scheduler) if scheduler else parallel(jobs)
 
     def advance(count: int = 1, *, failed: int = 0, known: bool = False) -> None:
         for _ in range(count):
             progress()
 
     watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
-    solved = tuple(run_case(read, out, pool=pool, is_fresh=fresh, watch=watch).sweep.results)
-    if reasons := tuple(failure.reason for each in solved for failure in each.failures):
-        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), solved)
-    return solved
+    results = tuple(run_case(read, out, pool=pool, is_fresh=fresh, watch=watch).sweep.results)
+    if reasons := tuple(failure.reason for each in results for failure in each.failures):
+        raise NotConverged(Message(Code.SEVERAL, reasons=reasons), results)
+    return results
 
 
 def run_case(
@@ -108,57 +107,41 @@ def run_case(
         FpsolveError: a curve cannot be simulated, or only that; nothing is solved.
         KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
     """
-    if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
-        raise FpsolveError(f"{case.path}: {refused}")
+    refuse_no_numbers(case)
     if monte_carlo:
         refuse_obstacles(case)
-    simulations = Simulations(case)
-    simulated = simulations.simulated
-    with own_folder(case, out, [SOLVED, *[SIMULATED] * monte_carlo]) as folder:
-        sweep = _solve(case, folder, pool, watch, is_fresh=is_fresh)
+    folder, simulations = Path(out) / case.name, Simulations(case)
+    with own_folder(folder, "run", case):
+        with writable(folder):
+            sweep = Sweep(case, folder, is_fresh=is_fresh)
+        sweep.run(pool, watch)
+        results, simulated = sweep.results, simulations.simulated
+        said = [*notes(case, results.telling, count=len(results))]
 
-        def show() -> None:
+        def finish() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):
-                results.write_figures(case, sweep.results, simulated, folder, sweep.results.table)
-            if watch.has_report:
-                is_whole = not simulations.interruption and len(simulated) == case.planned * monte_carlo
-                blocks = chain(
-                    results.show(case, sweep.results, folder, simulated, sweep.results.table),
-                    show_simulated(case, simulated, sweep.results) if simulated else (),
-                    sweep.notes,
-                    notes(case, simulated, MONTE_CARLO),
-                )
-                files = *TABLES, *SIMULATION * bool(simulated)
-                is_whole &= sweep.done == case.planned
-                write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
+                solved.write_figures(case, results, simulated, folder, results.table)
+            blocks = chain(
+                solved.show(case, results, folder, simulated, results.table),
+                show_simulated(case, simulated, results) if simulated else (),
+                said,
+                notes(case, simulated, MONTE_CARLO),
+            )
+            is_whole = len(results.whole) == case.planned and simulations.whole == case.planned * monte_carlo
+            files = *TABLES, *SIMULATION * bool(simulated)
+            write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
 
         told = saying_if_interrupted(lambda: f"; what was {'done' if simulated else 'solved'} is kept in {folder}")
-        with told, shown_at_the_end(show):
-            table = sweep.results.table
-            watch.shown(results.show(case, sweep.results, folder, (), table, is_whole=watch.is_whole))
-            watch.noted(sweep.notes)
+        with told, shown_at_the_end(finish):
+            watch.shown(solved.show(case, results, folder, (), results.table, is_whole=watch.is_whole))
+            watch.noted(said)
             if monte_carlo:
-                simulations.run(folder, pool, watch, sweep.results, is_fresh=is_fresh)
+                with written_by("simulate", folder):
+                    simulations.run(folder, pool, watch, results, is_fresh=is_fresh)
     return Outcome(sweep, simulations)
 
 
-def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool) -> Sweep:
-    """Solve the sets of a case that are not known, and write all tables."""
-    with saying_if_interrupted(lambda: " before the first curve"), writable(folder):
-        sweep = Sweep(case, folder, is_fresh=is_fresh)
-    with (
-        saying_if_interrupted(
-            lambda: kept(sweep.done, of_curves(case), folder, is_more=len(sweep.results) > sweep.done)
-        ),
-        writable(folder),
-    ):
-        try:
-            with watch.bar(sweep.phase) as progress:
-                sweep.solve(pool, progress)
-        except (KeyboardInterrupt, WorkersDied):
-            sweep.results.add_rest()
-            sweep.write_all()
-            raise
-        with watch.bar(Phase(case.name, "tables")), signals_held():
-            sweep.write_all()
-    return sweep
+def refuse_no_numbers(case: Case) -> None:
+    """Refuse a case that can only be simulated. Raises `FpsolveError`."""
+    if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
+        raise FpsolveError(f"{case.path}: {refused}")

@@ -8,14 +8,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import monotonic
-from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE
+from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
 from fpsolve.errors import WorkersDied
-from fpsolve.files import atomic
+from fpsolve.files import atomic, writable
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.columns import COUNTS
@@ -23,15 +23,13 @@ from fpsolve.results.eigenfunctions import write_curves
 from fpsolve.results.files import FILES
 from fpsolve.results.known import Results, record_of
 from fpsolve.results.response import write_response
-from fpsolve.results.tables import GROWING, TABLES, Writer, facts_of
+from fpsolve.results.tables import GROWING, TABLES, Facts, Writer, facts_of
 from fpsolve.solve.curve import Status
 from fpsolve.solve.question import Job
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records
 from fpsolve.solve.sets import solve_set
-from fpsolve.tell.blocks import Note
-from fpsolve.tell.notes import notes
-from fpsolve.tell.progress import MOMENTS, SETS, Advance, Phase
+from fpsolve.tell.progress import MOMENTS, SETS, Advance, Phase, Watch
 
 SOLVED_RECORDS = "records/solved.jsonl"
 """The file of the records of sets."""
@@ -86,33 +84,69 @@ class Sweep:
     Attributes:
         results: what is known of them.
         known: how many an earlier run had finished.
-        failed: how many sets have failed, also in part, once the tables are written.
-        fails: whether some have, or no number was found, then.
-        notes: what is said of all sets, then.
+        facts: what the tables say of this run, as they were written the last time.
     """
 
-    failed = 0
-    fails = False
-    notes: tuple[Note, ...] = ()
-
     def __init__(self, case: Case, folder: Path, *, is_fresh: bool = False) -> None:
-        self.case, self.folder = case, folder.resolve()
-        self.started = datetime.now(UTC)
-        self.results = Results(case, Records(self.folder / SOLVED_RECORDS, is_fresh=is_fresh))
-        self.facts, self._due, self.known = dict[str, Any](), 0.0, len(self.results)
-        self._steps_each = max(case.p.size if MOMENT.name in case.asked else 0, 1) if case.planned == 1 else 1
+        self.case, self.folder, self.started = case, folder, datetime.now(UTC)
+        self.results = Results(case, Records(folder / SOLVED_RECORDS, is_fresh=is_fresh))
+        self.known, self._due = len(self.results), 0.0
+        self.facts: Facts = {}
 
-    @property
-    def phase(self) -> Phase:
-        """What `solve` reports as progress: each set, of a single one each p."""
-        if self.case.planned > 1:
-            return Phase(self.case.name, "solving", self.case.planned, SETS)
-        return Phase(self.case.name, "solving", self._steps_each, MOMENTS)
+    def run(self, pool: Pool, watch: Watch) -> None:
+        """Solve the sets that are not known, and write all tables; an interrupt keeps what is solved, which it says."""
+        case, results, each = self.case, self.results, 1
+        phase = Phase(case.name, "solving", case.planned, SETS)
+        if case.planned == 1:
+            each = max(case.p.size if MOMENT.name in case.asked else 0, 1)
+            phase = Phase(case.name, "solving", each, MOMENTS)
 
-    @property
-    def done(self) -> int:
-        """How many sets are finished."""
-        return len(self.results.whole)
+        def told() -> str:
+            done = len(results.whole)
+            return kept(done, of_curves(case), self.folder, is_more=len(results) > done)
+
+        with saying_if_interrupted(told), writable(self.folder):
+            try:
+                with watch.bar(phase) as progress:
+                    self._solve(pool, progress, each)
+            except (KeyboardInterrupt, WorkersDied):
+                results.add_rest()
+                self._write_all()
+                raise
+            with watch.bar(Phase(case.name, "tables")):
+                self._write_all()
+
+    def _solve(self, pool: Pool, progress: Advance, steps: int) -> None:
+        """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow.
+
+        Args:
+            steps: of the progress, for each set; a single one reports each p itself.
+        """
+        case, results = self.case, self.results
+        if len(results.whole) < case.planned:
+            self._write(GROWING)
+        draws = [any(BY_NAME[name].draws for name in asked) for asked in results.asked]
+        numbers = range(1, case.planned + 1)
+        left = [number for number in numbers if draws[number > 1] or number not in results.whole]
+        if len(left) < case.planned:
+            progress((case.planned - len(left)) * steps, known=True)
+        is_alone = case.planned == 1 and not pool.is_elsewhere
+        jobs: Iterable[Job] = map(results.job, left)
+        if is_alone:
+            jobs = (replace(job, keep=self._grow, progress=progress) for job in jobs)
+        with SERIAL if is_alone else pool as workers:
+            try:
+                for job, done in workers.run(solved, jobs):
+                    is_failed = self._take(job, done)
+                    if done.interrupted:
+                        raise KeyboardInterrupt
+                    progress(0 if is_alone and done.record else steps, failed=int(is_failed))
+                    if done.record:
+                        self._write_if_due()
+            except (KeyboardInterrupt, WorkersDied):
+                for job, done in workers.rest():
+                    self._take(job, done)
+                raise
 
     def _grow(self, job: Job) -> None:
         """Keep what is known of the only set, and show it in the tables; once it is solved, only pictures are drawn."""
@@ -120,62 +154,41 @@ class Sweep:
             self.results.put(job.curve, record_of(job))
             self._write_if_due()
 
-    def solve(self, pool: Pool, progress: Advance) -> None:
-        """Solve what is not known yet, and draw; tables are written first, if anything is missing, and as they grow."""
-        if self.done < self.case.planned:
-            self.write_tables()
-        draws = [any(BY_NAME[name].draws for name in asked) for asked in self.results.asked]
-        numbers = range(1, self.case.planned + 1)
-        left = [number for number in numbers if draws[number > 1] or number not in self.results.whole]
-        if len(left) < self.case.planned:
-            progress((self.case.planned - len(left)) * self._steps_each, known=True)
-        is_alone = self.case.planned == 1 and not pool.is_elsewhere
-        jobs: Iterable[Job] = map(self.results.job, left)
-        if is_alone:
-            jobs = (replace(job, keep=self._grow, progress=progress) for job in jobs)
-        with SERIAL if is_alone else pool as workers:
-            try:
-                for job, each in workers.run(solved, jobs):
-                    is_failed = self._take(job, each)
-                    if each.interrupted:
-                        raise KeyboardInterrupt
-                    progress(0 if is_alone and each.record else self._steps_each, failed=int(is_failed))
-                    if each.record:
-                        self._write_if_due()
-            except (KeyboardInterrupt, WorkersDied):
-                for job, each in workers.rest():
-                    self._take(job, each)
-                raise
-
-    def _take(self, job: Job, each: Solved) -> bool:
+    def _take(self, job: Job, done: Solved) -> bool:
         """Keep what became of a set, and its pictures; whether it has failed."""
-        is_failed = bool(each.record) and self.results.put(job.curve, each.record).status.fails
-        for name, content in each.files.items():
+        is_failed = bool(done.record) and self.results.put(job.curve, done.record).status.fails
+        for name, content in done.files.items():
             with atomic(self.folder / name) as draft:
                 draft.write_bytes(content)
         return is_failed
 
     def _write_if_due(self) -> None:
         if monotonic() >= self._due:
-            self.write_tables()
+            self._write(GROWING)
 
-    def write_tables(self, tables: dict[str, Writer] = GROWING) -> None:
+    def _write(self, tables: dict[str, Writer]) -> None:
         """Write tables of all sets, the first one last."""
         started, self.facts = monotonic(), facts_of(self.case, self.started)
         for name, write in reversed(tables.items()):
             write(self.case, self.results, self.folder / name, self.facts)
         self._due = monotonic() + REST * (monotonic() - started)
 
-    def write_all(self) -> None:
+    def _write_all(self) -> None:
         """Write all tables, the series over the curves, and the files of what records hold."""
-        self.write_tables(TABLES)
+        self._write(TABLES)
         write_curves(self.case, self.folder)
         for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
                 write_response(result.response, result.curve, self.folder)
-        table = self.results.table
-        numbers = [each.values for each in table.values() if each.quantity not in (*COUNTS, STATUS, SECONDS)]
-        is_empty = bool(numbers) and not any(np.isfinite(each).any() for each in numbers)
-        self.failed = int(np.isin(table[STATUS.name].values, [each for each in Status if each.fails]).sum())
-        self.fails = is_empty or self.failed > 0
-        self.notes = tuple(notes(self.case, self.results.telling, count=len(self.results)))
+
+    @property
+    def failed(self) -> int:
+        """How many sets have failed, also in part."""
+        return int(np.isin(self.results.table[STATUS.name].values, [each for each in Status if each.fails]).sum())
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether numbers were asked for, and none was found."""
+        columns = self.results.table.values()
+        numbers = [each.values for each in columns if each.quantity not in (*COUNTS, STATUS, SECONDS)]
+        return bool(numbers) and not any(np.isfinite(each).any() for each in numbers)

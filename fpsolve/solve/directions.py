@@ -49,6 +49,4 @@ def _unclear(found: Densities) -> Iterator[Message]:
         yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
 
 
-QUESTION: Question = question_of_pictures(
-    DIRECTIONS, "density of directions", _solve, r"densities(-\d+)?\.(nc|png|pdf)"
-)
+QUESTION: Question = question_of_pictures(DIRECTIONS, "density of directions", _solve)

@@ -77,13 +77,12 @@ def question_of_pictures(
     pictures: Pictures,
     symbol: str,
     solve: Callable[[Job, Settings], tuple[Message, ...]],
-    names: str,
 ) -> Question:
     """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
 
     Args:
         pictures: what is drawn.
-        symbol, solve, names: see `Question`.
+        symbol, solve: see `Question`.
     """
     return Question(
         pictures.part,
@@ -93,9 +92,7 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         draws=True,
-        names=names,
     )
 
 
-NAMES = r"(curves|eigenfunctions(-\d+)?)\.pvd|eigenfunctions(-\d+)?/p[+-][\d.e+-]+\.vtu|density\.vtu|show\.py"
-QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, NAMES)
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve)

@@ -17,4 +17,4 @@ def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
     return {RATE_FUNCTION: result and result.moments.rate_function} if is_asked else {}
 
 
-QUESTION: Question = Question(RATE_FUNCTION.name, numbers=_numbers, names=r"rate_function\.(png|pdf)")
+QUESTION: Question = Question(RATE_FUNCTION.name, numbers=_numbers)

@@ -83,7 +83,10 @@ def test_spectrum_becomes_a_case_and_a_verdict_by_the_averaged_formulas(tmp_path
     assert values == pytest.approx({**oscillator, "noise.alpha": 12.0, "noise.sigma": 0.15 * OMEGA**2}, rel=1e-4)
     assert 'kind = "ornstein-uhlenbeck"' in printed
     assert "the mean square decays with a probability of > 99.9 %" in printed
-    assert files(tmp_path / "results/m.csv") == {f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")}
+    assert files(tmp_path / "results/m.csv") == {
+        *(f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")),
+        "records/files.txt",
+    }
 
 
 def test_lambda_within_its_standard_error_of_0_decides_nothing(tmp_path):
