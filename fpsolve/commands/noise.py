@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
 from cyclopts import Parameter
 
 from fpsolve.case.case import Case
@@ -19,7 +19,7 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.files import writable, write_json, write_text
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
 from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
-from fpsolve.measured.reading import checked_scale
+from fpsolve.measured.reading import Mode, checked_scale
 from fpsolve.measured.signals import SIGNALS, factor_of, powers
 from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.units import GRAVITY
@@ -159,8 +159,8 @@ class Statement:
 
 
 NOTHING_STATED = Statement()
-OF_SPECTRA, OF_RECORDS = ("sided", "averages", "row", "log_log"), ("segment", "rate")
-"""Options for one kind of file alone."""
+OF_SPECTRA, OF_RECORDS, OF_FILES = ("sided", "averages", "row", "log_log"), ("segment", "rate"), ("over", "skip")
+"""Options for files alone: of one kind, of any."""
 RANGES = {
     "gm": (0.0, math.inf, "> 0, in m"),
     "length": (0.0, math.inf, "> 0, in m"),
@@ -171,15 +171,6 @@ RANGES = {
     "restitution": (0.0, 1.0 + 1e-15, "> 0 and <= 1; 1 means no wall"),
 }
 """Between which numbers the values of options are, and how that is said."""
-CLOSE = 0.02
-"""By which share of it two statements of a frequency may differ."""
-
-
-def refuse(table: dict[str, bool]) -> None:
-    """Raise the first sentence that is true as `FpsolveError`."""
-    for sentence, is_true in table.items():
-        if is_true:
-            raise FpsolveError(sentence)
 
 
 def measurement_of(
@@ -190,75 +181,54 @@ def measurement_of(
     Raises:
         FpsolveError: the options contradict each other, or a file cannot be read.
     """
-    of, record, named = stated.of or stated.noise_in or "stiffness", stated.record, stated.named
-    place, has_gm, source = SIGNALS[of].noise_in, stated.gm is not None, spectrum or record or Path(named or "")
-    unfit, told = OF_RECORDS[: 1 if record else 2], "is for a record, and a spectrum was named"
-    if named:
-        unfit, told = (*OF_SPECTRA, *OF_RECORDS, "column", "over", "skip"), "is for a file, and a density was named"
-    elif not spectrum:
-        unfit, told = OF_SPECTRA, "is for a spectrum, and a record was named"
-    remedy = "leave it out" if has_gm else "state the mean metacentric height in m by --gm"
-    is_system = stated.damping_ratio is not None or stated.modes is not None
-    given, usual = vars(stated), vars(NOTHING_STATED)
-    refuse(
-        {
-            f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out": (
-                stated.noise_in not in (None, place)
-            ),
-            "name a file, that of a spectrum or of a record by --record, or a density by --named": not source.name,
-            "--named is in place of a file; leave one of them out": bool(named and (spectrum or record)),
-            "--parameters are those of --named; name a density, or leave them out": bool(
-                stated.parameters and not named
-            ),
-            f"--gm belongs to --of height; {remedy}": (of == "height") != has_gm,
-            "--length is for --of acceleration; leave it out": stated.length is not None and of != "acceleration",
-            "--mode is for the table that --modes names; name one, or leave it out": bool(stated.mode)
-            and not stated.modes,
-            "--case states the system; leave out --damping-ratio, --restitution and --modes": bool(
-                case and (is_system or stated.restitution is not None)
-            ),
-            "--restitution needs the damping of the oscillator, too; state --damping-ratio": (
-                stated.restitution is not None and not is_system
-            ),
-            **{f"--{each.replace('_', '-')} {told}; leave it out": given[each] != usual[each] for each in unfit},
-        }
-    )
-    for name, (low, high, accepted) in RANGES.items():
-        for value in given[name] if name == "frequency" and given[name] else [given[name]]:
+    given, of = vars(stated), stated.of or stated.noise_in or "stiffness"
+    place, source = SIGNALS[of].noise_in, spectrum or stated.record or Path(stated.named or "")
+    has_file = bool(spectrum or stated.record)
+    if stated.noise_in not in (None, place):
+        raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
+    if not source.name:
+        raise FpsolveError("name a file, that of a spectrum or of a record by --record, or a density by --named")
+    for options, is_wrong, told in (
+        (["named"], has_file, "is in place of a file, and one was named"),
+        (["parameters"], not stated.named, "are those of --named"),
+        ([*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column"], not has_file, "is for a file, and a density was named"),
+        (OF_SPECTRA, not spectrum, "is for a spectrum, and a record was named"),
+        (OF_RECORDS[: 1 if stated.record else 2], spectrum, "is for a record, and a spectrum was named"),
+        (["gm"], of != "height", "belongs to --of height"),
+        (["length"], of != "acceleration", "is for --of acceleration"),
+        (["mode"], not stated.modes, "is for the table that --modes names"),
+        (["damping_ratio", "restitution", "modes"], case, "is of the system, which --case states"),
+    ):
+        for option in options:
+            if is_wrong and given[option] != vars(NOTHING_STATED)[option]:
+                raise FpsolveError(f"--{option.replace('_', '-')} {told}; leave it out")
+    if of == "height" and stated.gm is None:
+        raise FpsolveError("--of height needs --gm; state the mean metacentric height in m by --gm")
+    if stated.restitution is not None and stated.damping_ratio is None and not stated.modes:
+        raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
+    for option, (low, high, accepted) in RANGES.items():
+        for value in given[option] if isinstance(given[option], list) else [given[option]]:
             if value is not None and not low < value < high:
-                raise FpsolveError(f"got --{name.replace('_', '-')} {value:g}; must be {accepted}")
+                raise FpsolveError(f"got --{option.replace('_', '-')} {value:g}; must be {accepted}")
     modes = _modes(stated, case)
     if case:
         refuse_wrong_case(case, of, stated.terms)
     limits = stated.rtol or RTOL, stated.seconds or SECONDS
     wanted = Wanted(of, stated.kind, stated.terms, modes, stated.gm, case, stated.segment, *limits)
-    if named:
-        return _named(named, stated, of, 2 * modes.omega[0]), wanted, source
-    values = None
-    if record:
-        own = NOTHING_STATED if spectrum else stated
-        how = {"over": own.over, "unit": own.unit}
-        values = read_record(
-            record, of=of, rate=stated.rate, column=stated.column, scale=own.scale, skip=own.skip, **how
-        )
+    if stated.named:
+        return _named(stated.named, stated, of, 2 * modes.omega[0]), wanted, source
+
+    def chosen(*options: str) -> dict[str, Any]:
+        return {option: given[option] for option in options}
+
+    how, variance = chosen(*OF_FILES, "unit", "scale"), None
+    if stated.record:
+        record = read_record(stated.record, of=of, **chosen("rate", "column"), **({} if spectrum else how))
         if not spectrum:
-            return values, wanted, source
-    data = read_spectrum(
-        source,
-        per=stated.per,
-        sided=stated.sided,
-        of=of,
-        column=None if record else stated.column,
-        over=stated.over,
-        unit=stated.unit,
-        scale=stated.scale,
-        skip=stated.skip,
-        row=stated.row,
-        log_log=stated.log_log,
-        averages=stated.averages,
-        variance=None if values is None else float(values.values.var()),
-    )
-    return data, wanted, source
+            return record, wanted, source
+        variance, how["column"] = float(record.values.var()), None
+    how = chosen("per", "column", *OF_SPECTRA) | how
+    return read_spectrum(source, of=of, variance=variance, **how), wanted, source
 
 
 def _named(name: str, stated: Statement, of: str, near: float) -> Spectrum:
@@ -284,31 +254,31 @@ def _modes(stated: Statement, case: Case | None) -> Modes:
         "--frequency": [unit * each for each in stated.frequency or ()],
         "--length": [math.sqrt(GRAVITY / stated.length)] if stated.length else [],
         "--case": [*natural_frequencies(case.system)[:2]] if case else [],
-        "--modes": [2 * math.pi * frequency for frequency, _ in table],
+        "--modes": [2 * math.pi * each.frequency for each in table],
     }
     if case and not found["--case"]:
         raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
-    found = {option: each for option, each in found.items() if each}
-    if not found:
+    told = {
+        option: ", ".join(f"{each / (2 * math.pi):.4g} Hz" for each in omega)
+        for option, omega in found.items()
+        if omega
+    }
+    if not told:
         raise FpsolveError("state the natural frequency by --frequency, or a system by --case or --modes")
-    (first, omega), *others = found.items()
-    for option, other in others:
-        if len(other) != len(omega) or not np.allclose(np.sort(other), np.sort(omega), rtol=CLOSE):
-            hertz = {
-                key: ", ".join(f"{each / (2 * math.pi):.4g} Hz" for each in values) for key, values in found.items()
-            }
-            told = " and ".join(f"{key} {text}" for key, text in hertz.items())
-            raise FpsolveError(f"got {told}; leave out one of {first} and {option}")
+    if len(told) > 1:
+        text = " and ".join(f"{option} {words}" for option, words in told.items())
+        raise FpsolveError(f"got {text}; leave out one of {' and '.join(told)}")
+    [omega] = filter(None, found.values())
     if len(omega) > 2:
         raise FpsolveError(f"got {len(omega)} frequencies; must be one or two; choose those of the coupled modes")
-    known = zeta if zeta is not None else table[0][1] if table else math.nan
+    known = zeta if zeta is not None else table[0].damping_ratio if table else math.nan
     return Modes(tuple(omega), known, stated.restitution)
 
 
-def _rows(stated: Statement) -> list[tuple[float, float]]:
-    """Frequency and damping ratio, NaN where it is not known, of the rows of the table of modes that are chosen."""
+def _rows(stated: Statement) -> Sequence[Mode]:
+    """The rows of the table of modes that are chosen, one or two; none without a table."""
     if stated.modes is None:
-        return []
+        return ()
     rows = read_modes(stated.modes)
     for number in stated.mode or ():
         if not 1 <= number <= len(rows):
@@ -318,7 +288,7 @@ def _rows(stated: Statement) -> list[tuple[float, float]]:
     if len(chosen) > 2:
         text = f"has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2"
         raise FpsolveError(f"{stated.modes}: {text}")
-    return [(each.frequency, each.damping_ratio) for each in chosen]
+    return chosen
 
 
 def noise(

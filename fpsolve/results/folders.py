@@ -25,7 +25,10 @@ _FOLDERS = r"records|eigenfunctions(-\d+)?"
 
 @contextmanager
 def own_folder(folder: Path, command: str, case: Case | None = None) -> Iterator[None]:
-    """A folder for one run of a command alone, see `written_by`. What is there of other parameters is removed first.
+    """A folder for one run of a command alone, that keeps the list of what is written in the body.
+
+    What the command wrote the last time is removed first, and what is there of other parameters. A name is in the list
+    before its file is there, so that the next run knows what a killed one has left.
 
     Args:
         case: whose parameters count; those of no case are always the same.
@@ -45,34 +48,19 @@ def own_folder(folder: Path, command: str, case: Case | None = None) -> Iterator
             for name, owner in names.items():
                 if owner == command and _is_folder(folder / name):
                     raise OutputError(f"{folder / name} cannot be written: Is a directory", Remedy.FOLDER)
-            if former != digest:
-                _remove(folder, names)
-                write_text(folder / LIST, f"{digest}\n")
-        with written_by(command, folder):
+            known = {name: owner for name, owner in names.items() if owner != command and former == digest}
+            _remove(folder, names.keys() - known.keys())
+            write_text(folder / LIST, "\n".join([digest, *(f"{owner} {name}" for name, owner in known.items()), ""]))
+
+        def add(path: Path) -> None:
+            name = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else ""
+            if name and known.get(name) != command:
+                known[name] = command
+                with (folder / LIST).open("a", encoding="utf-8") as file:
+                    file.write(f"{command} {name}\n")
+
+        with announced(add):
             yield
-
-
-@contextmanager
-def written_by(command: str, folder: Path) -> Iterator[None]:
-    """A command writes into a folder in the body. What it wrote the last time is removed; names of new files are kept.
-
-    A name is in the list before its file is there, so that the next run knows what a killed one has left.
-    """
-    with writable(folder):
-        digest, names = _read(folder)
-        _remove(folder, [name for name, owner in names.items() if owner == command])
-        names = {name: owner for name, owner in names.items() if owner != command}
-        write_text(folder / LIST, "".join([f"{digest}\n", *(f"{owner} {name}\n" for name, owner in names.items())]))
-
-    def add(path: Path) -> None:
-        name = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else ""
-        if name and names.get(name) != command:
-            names[name] = command
-            with (folder / LIST).open("a", encoding="utf-8") as file:
-                file.write(f"{command} {name}\n")
-
-    with announced(add):
-        yield
 
 
 def _read(folder: Path) -> tuple[str, dict[str, str]]:

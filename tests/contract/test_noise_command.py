@@ -273,7 +273,7 @@ REFUSED = {
     "--record record.csv --sided one --frequency 2": "is for a spectrum",
     "m.csv --sided two --frequency 2 --record record.csv": "state another sided",
     f"{FILE} --case my.toml": "has its noise in the damping",
-    f"{FILE} --case my.toml --damping-ratio 0.1": "leave out --damping-ratio",
+    f"{FILE} --case my.toml --damping-ratio 0.1": "which --case states; leave it out",
     "peaks.csv --sided one --frequency 2 --frequency 6": "take another kind, such as filter",
     f"{GROUND} --record record.csv": "in place of a file",
     f"{GROUND} --scale 0": "state another --scale",

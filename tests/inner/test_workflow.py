@@ -75,7 +75,7 @@ def raising(failure):
         ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
         ("fpsolve.solve.sets.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
         (
-            "fpsolve.commands.sweep.write_curves",
+            "fpsolve.commands.cases.write_curves",
             "run",
             "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
         ),
