@@ -26,7 +26,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from fpsolve import __version__
-from fpsolve.arrays import is_whole, shown
+from fpsolve.arrays import is_whole, require, shown
 from fpsolve.budget import Meter, watched
 from fpsolve.errors import FpsolveError, WorkersDied
 
@@ -178,11 +178,13 @@ def parallel(count: int | None = None) -> Pool:
         count: how many at most. None: one per processor, started after this process's first 1.5 s of work.
 
     Raises:
-        FpsolveError: the count is not a number of processes.
+        TypeError: the count is no whole number.
+        FpsolveError: it is not a number of processes.
     """
+    known = f"a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
+    require(count, int | None, "jobs", known)
     if count is not None and not is_whole(count, 1, MOST_JOBS):
-        known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
-        raise FpsolveError(f"jobs: got {shown(count)}; {known}")
+        raise FpsolveError(f"jobs: got {shown(count)}; must be {known}")
     size = count or processors()
     return (
         Pool(partial(Processes, size), size=size, own_seconds=0.0 if count else START_SECONDS) if size > 1 else SERIAL
@@ -225,8 +227,10 @@ def _client(address: str) -> Any:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
     for name in ("distributed", "distributed.client", "tornado.application"):  # they report workers that come and go
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    if type(address) is not str or not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
-        raise FpsolveError(f"scheduler: got {shown(address)}; must be an address such as tcp://host:8786")
+    known = "an address such as tcp://host:8786"
+    require(address, str, "scheduler", known)
+    if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
+        raise FpsolveError(f"scheduler: got {shown(address)}; must be {known}")
     connect: Any = distributed.Client
     try:
         client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)

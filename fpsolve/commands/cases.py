@@ -13,6 +13,7 @@ from time import monotonic
 
 import numpy as np
 
+from fpsolve.arrays import require
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.sections import RESPONSE
 from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
@@ -244,10 +245,14 @@ def run(
         progress: called once for each curve that is done, or for each p of a case with a single curve.
 
     Raises:
+        TypeError: an argument is of another type.
         CaseError: with every fault of the file; nothing is solved.
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
         NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
     """
+    require(case, Case | str | Path, "case", "a case, or the path of its file")
+    require(out, str | Path, "out", "the path of a folder")
+    require(progress, Callable, "progress", "a function")
     read = case if isinstance(case, Case) else load_case(case)
     pool = cluster(scheduler) if scheduler else parallel(jobs)
 
