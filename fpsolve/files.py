@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import errno
 import json
-import os
 import stat
 from codecs import BOM_UTF8
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -77,8 +77,6 @@ def writable(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
         raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}", Remedy.FOLDER) from failure
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to", Remedy.FOLDER)
     try:
         yield
     except OSError as failure:
@@ -134,12 +132,12 @@ def write_text(path: Path, text: str) -> None:
         draft.write_text(text, encoding="utf-8")
 
 
+@dataclass
 class Unreadable(Exception):
     """A file that is not what it should be: a sentence on why, and what to do; the line, where that is in the file."""
 
-    def __init__(self, sentence: str, line: int | None = None) -> None:
-        super().__init__(sentence)
-        self.sentence, self.line = sentence, line
+    sentence: str
+    line: int | None = None
 
 
 class Words(NamedTuple):
