@@ -199,12 +199,11 @@ LIST = "records/files.txt"
 
 def put(folder: Path, command: str, *names: str) -> None:
     """Write empty files, and say in the list of the folder that a command did, for other parameters if it is new."""
-    path = folder / LIST
-    text = path.read_text() if path.exists() else "of other parameters\n"
     for name in (LIST, *names):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).touch()
-    path.write_text(text + "".join(f"{command} {name}\n" for name in names))
+    text = (folder / LIST).read_text() or "of other parameters\n"
+    (folder / LIST).write_text(text + "".join(f"{command} {name}\n" for name in names))
 
 
 def chain_of_masses(count, damping=0.02, spring=0):

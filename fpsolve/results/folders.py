@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.files import LARGEST, alone, announced, draft_of, writable, write_text
+from fpsolve.files import alone, announced, draft_of, writable, write_text
 
 LIST = "records/files.txt"
 """The list: a digest of the parameters, then a line for each file, with the command that wrote it."""
@@ -66,8 +66,8 @@ def own_folder(folder: Path, command: str, case: Case | None = None) -> Iterator
 def _read(folder: Path) -> tuple[str, dict[str, str]]:
     """The digest of the parameters, and the commands by the names of their files; nothing where the list is none."""
     path = folder / LIST
-    is_list = path.is_file() and path.stat().st_size <= LARGEST
-    digest, _, lines = path.read_text(encoding="utf-8", errors="replace").partition("\n") if is_list else ("", "", "")
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    digest, _, lines = text.partition("\n")
     return digest, {name: command for command, name in _LINE.findall(lines)}
 
 

@@ -328,12 +328,6 @@ def test_a_sigterm_ends_a_run_that_keeps_what_it_has(tmp_path, before):
     assert files(tmp_path / "results/case") >= TABLES
 
 
-def test_handler_of_sigterm_is_as_before_a_command(tmp_path):
-    before = signal.getsignal(signal.SIGTERM)
-    assert run(tmp_path, "--version").code == 0
-    assert signal.getsignal(signal.SIGTERM) == before
-
-
 START = """
 import sys
 import fpsolve, fpsolve.cli
