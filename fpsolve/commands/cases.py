@@ -289,9 +289,7 @@ def run_case(
         FpsolveError: a curve cannot be simulated, or only that; nothing is solved.
         KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
     """
-    refuse_no_numbers(case)
-    if monte_carlo:
-        refuse_obstacles(case)
+    refuse_no_numbers(case, monte_carlo=monte_carlo)
     folder, simulations = Path(out) / case.name, Simulations(case)
     with own_folder(folder, "run", case):
         with writable(folder):
@@ -322,7 +320,9 @@ def run_case(
     return Outcome(sweep, simulations)
 
 
-def refuse_no_numbers(case: Case) -> None:
-    """Refuse a case that can only be simulated. Raises `FpsolveError`."""
+def refuse_no_numbers(case: Case, *, monte_carlo: bool) -> None:
+    """Refuse a case that can only be simulated, or cannot be where that is asked for. Raises `FpsolveError`."""
     if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
         raise FpsolveError(f"{case.path}: {refused}")
+    if monte_carlo:
+        refuse_obstacles(case)

@@ -18,30 +18,11 @@ from fpsolve.pool import Pool
 from fpsolve.results.design import write_design
 from fpsolve.results.folders import own_folder
 from fpsolve.results.tables import facts_of
-from fpsolve.solve.design import DesignOutcome, solve_design, wanted_of
+from fpsolve.solve.design import solve_design, wanted_of
 from fpsolve.tell.blocks import Note
 from fpsolve.tell.design import found_of, show
-from fpsolve.tell.progress import SOLVES, Phase, Watch
+from fpsolve.tell.progress import SOLVES, Phase
 from fpsolve.tell.terminal import print_blocks
-
-
-def design_case(case: Case, target: str, by: tuple[Axis, ...], out: Path, *, watch: Watch) -> DesignOutcome:
-    """Find the design of a case, see `wanted_of`; write design.json and, where there is one, design.toml.
-
-    Raises:
-        OutputError: the folder cannot be made or written to, or another run writes into it.
-        KeyboardInterrupt: nothing is kept.
-    """
-    folder, started = out / case.name, datetime.now(UTC)
-    with (
-        own_folder(folder, "design", case),
-        saying_if_interrupted(lambda: "; nothing is kept", ANEW),
-        writable(folder),
-    ):
-        with watch.bar(Phase(case.name, "design", unit=SOLVES)) as progress:
-            found = solve_design(case, target, by, progress)
-        write_design(case, found, folder, facts_of(case, started))
-    return found
 
 
 def design(
@@ -80,9 +61,17 @@ def design(
         return wanted_of(case, target, by or (), start or (), stop or ())
 
     def work(case: Case, _: Pool) -> Done:
-        outcome = design_case(case, *wanted(case), out, watch=options.watch(is_json=json))
+        folder, started = out / case.name, datetime.now(UTC)
+        with (
+            own_folder(folder, "design", case),
+            saying_if_interrupted(lambda: "; nothing is kept", ANEW),
+            writable(folder),
+        ):
+            with options.watch(is_json=json).bar(Phase(case.name, "design", unit=SOLVES)) as progress:
+                outcome = solve_design(case, *wanted(case), progress)
+            write_design(case, outcome, folder, facts_of(case, started))
         if json:
-            print_in_one_line(out / case.name / "design.json")
+            print_in_one_line(folder / "design.json")
         is_short = options.quiet or json
         print_blocks(each for each in show(case, outcome) if isinstance(each, Note) or not is_short)
         code = CHECK_FAILED if outcome.is_out_of_reach else NOT_CONVERGED if outcome.found is None else 0

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from fpsolve.case.case import Case
-from fpsolve.commands.cases import run_case
+from fpsolve.commands.cases import refuse_no_numbers, run_case
 from fpsolve.commands.errors import NOT_CONVERGED
 from fpsolve.commands.options import FLAGS, Cases, Done, Flags, Fresh, on_cases
 from fpsolve.pool import Pool
 from fpsolve.results.tables import whole_summary
-from fpsolve.solve.simulate import refuse_obstacles
 from fpsolve.tell.notes import left_out
 from fpsolve.tell.solved import done_of, known_of
 from fpsolve.tell.terminal import print_blocks
@@ -59,5 +59,5 @@ def run(
         return Done(what, code, known_of(case, sweep.known), interruption)
 
     typed = {"--all": 'output.quantities="all"'} if everything else {}
-    refuse = refuse_obstacles if monte_carlo else lambda _: None
+    refuse = partial(refuse_no_numbers, monte_carlo=monte_carlo)
     return on_cases(cases, flags.options, work, typed=typed, refuse=refuse, workers=flags.workers, out=flags.out)
