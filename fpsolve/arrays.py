@@ -87,6 +87,12 @@ def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
     return isinstance(value, int | np.integer) and type(value) is not bool and bool(least <= value <= most)
 
 
+def require(value: object, kinds: Any, name: str, must: str) -> None:
+    """Refuse an argument of another type, or True and False. Raises `TypeError`, one sentence with its name."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise TypeError(f"got {name} = {shown(value)}; must be {must}")
+
+
 def real_number(value: Any, name: str) -> float:
     """One number; texts and booleans are none. Raises `ValueError` where it is not a finite real number."""
     array = _finite(value)

@@ -194,6 +194,18 @@ def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+LIST = "records/files.txt"
+
+
+def put(folder: Path, command: str, *names: str) -> None:
+    """Write empty files, and say in the list of the folder that a command did, for other parameters if it is new."""
+    for name in (LIST, *names):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    text = (folder / LIST).read_text() or "of other parameters\n"
+    (folder / LIST).write_text(text + "".join(f"{command} {name}\n" for name in names))
+
+
 def chain_of_masses(count, damping=0.02, spring=0):
     """A₀ and A₁ of unit masses and springs from the ground on, one spring k(1 + ξ), and the frequencies.
 

@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from fpsolve.arrays import FloatArray, shortened, shown
+from fpsolve.arrays import FloatArray, require, shortened
 from fpsolve.case.explain import explain, is_list, refuse
 from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
@@ -451,8 +451,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     Raises:
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
-    if not isinstance(path, str | Path):
-        raise TypeError(f"got {shown(path)}; must be the path of a case file")
+    require(path, str | Path, "path", "the path of a case file")
+    require(overrides, list | tuple, "overrides", 'a list of texts, such as ["noise.D0=2.0"]')
     document = read_document(path, overrides, options)
     faults, data = document.faults, document.data
     faults += (document.fault(path, dotted(path), told) for path, told in take_removed(data))

@@ -113,13 +113,12 @@ def question_of_pictures(
     pictures: Pictures,
     symbol: str,
     solve: Callable[[Job, Settings], tuple[Message, ...]],
-    names: str,
 ) -> Question:
     """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
 
     Args:
         pictures: what is drawn.
-        symbol, solve, names: see `Question`.
+        symbol, solve: see `Question`.
     """
     return Question(
         pictures.part,
@@ -129,12 +128,8 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         draws=True,
-        names=names,
     )
 
 
-NAMES = r"(curves|eigenfunctions(-\d+)?)\.pvd|eigenfunctions(-\d+)?/p[+-][\d.e+-]+\.vtu|density\.vtu|show\.py"
-QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, NAMES)
-OF_DIRECTIONS: Question = question_of_pictures(
-    DIRECTIONS, "density of directions", _solve_directions, r"densities(-\d+)?\.(nc|png|pdf)"
-)
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve)
+OF_DIRECTIONS: Question = question_of_pictures(DIRECTIONS, "density of directions", _solve_directions)

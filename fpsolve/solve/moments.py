@@ -83,7 +83,7 @@ def _rates(case: Case, result: CurveResult | None) -> Numbers:
     return {RATE_FUNCTION: result.moments.rate_function if result else None} if is_asked else {}
 
 
-RATES: Question = Question(RATE_FUNCTION.name, numbers=_rates, names=r"rate_function\.(png|pdf)")
+RATES: Question = Question(RATE_FUNCTION.name, numbers=_rates)
 """I(s) = ps − Λ(p) at s = Λ′(p), which follows from Λ(p)."""
 
 

@@ -224,7 +224,6 @@ class Question:
         lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
         draws: whether files show it of which no record holds the numbers, so that it is solved again for them.
-        names: the pattern of the names of all files about it.
     """
 
     name: str
@@ -236,7 +235,6 @@ class Question:
     lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
     numbers: Callable[[Case, CurveResult | None], Numbers] = lambda *_: {}
     draws: bool = False
-    names: str = ""
 
     @property
     def entry(self) -> GenericAlias:

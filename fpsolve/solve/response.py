@@ -97,5 +97,4 @@ QUESTION: Question = Question(
     CurveResponse,
     RESPONSE,
     numbers=_numbers,
-    names=r"response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)",
 )

@@ -16,7 +16,7 @@ import fpsolve
 from fpsolve import NotConverged, load_case, open_results
 from fpsolve.exponent import INDICES
 from tests.conftest import sampled
-from tests.kit import DRAWN, HOPELESS, LEAN, TABLES, TEXT, case_in, files, read_csv, read_json, run
+from tests.kit import DRAWN, HOPELESS, LEAN, TABLES, TEXT, case_in, files, put, read_csv, read_json, run
 
 NUMBERS = "output={ figure=false, quantities=['moment', 'lyapunov_exponent'] }"
 WHOLE = DRAWN.replace("figure = true", "figure = false")
@@ -164,7 +164,8 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_to_the_same_numbers(wh
         "monte_carlo_response-2.png",
         "report.html",
     }
-    for name in mine | earlier:
+    put(folder, "simulate", *earlier)
+    for name in mine:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("{}", encoding="utf-8")
     told = interrupt(whole.case, tmp_path, 1)

@@ -341,6 +341,23 @@ def test_noise_so_strong_or_slow_that_moments_have_too_many_functions_is_refused
         even_moment(Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1e-3, 1.0)), 4.0)
 
 
+ARGUMENTS = {
+    "pair": fpsolve.tilted_density,
+    "case": fpsolve.run,
+    "out": lambda x: fpsolve.run("x", x),
+    "progress": lambda x: fpsolve.run("x", progress=x),
+    "overrides": lambda x: fpsolve.load_case("x", x),
+    "interval": lambda x: fpsolve.MomentLyapunovFunction(driven(itself), x),
+    "by": lambda x: fpsolve.design(driven(itself), "moment(2) = 0", x),
+}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_an_argument_of_another_type_is_named_in_one_sentence(name):
+    with pytest.raises(TypeError, match=rf"^got {name} = 3; must be .*\Z"):
+        ARGUMENTS[name](3)
+
+
 CALLS = [
     lambda of: fpsolve.moment_lyapunov(of, 2.0),
     lambda of: fpsolve.lyapunov_exponent(of),

@@ -72,16 +72,16 @@ def raising(failure):
 @pytest.mark.parametrize(
     ("place", "command", "message"),
     [
-        ("fpsolve.commands.cases.Sweep", "run", "interrupted before the first curve; run it again to go on"),
+        ("fpsolve.commands.cases.Sweep", "run", "interrupted"),
         ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
         ("fpsolve.solve.sets.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
         (
-            "fpsolve.commands.sweep.write_curves",
+            "fpsolve.commands.cases.write_curves",
             "run",
             "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
         ),
         (
-            "fpsolve.tell.terminal.print_blocks",
+            "fpsolve.commands.options.print_blocks",
             "run",
             "interrupted; what was solved is kept in results/case; run it again to go on",
         ),
