@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
@@ -21,10 +22,11 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, shortened, shown
+from fpsolve.arrays import FloatArray, shortened
 from fpsolve.case.explain import explain, is_list, refuse
-from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
+from fpsolve.case.kinds import half_of, kinds_of, system_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.removed import take_removed
@@ -36,6 +38,7 @@ from fpsolve.case.sections import (
     QUANTITY_NAMES,
     RESPONSE,
     SENSITIVITIES,
+    UNCERTAIN,
     ChartSection,
     ExcursionSection,
     Expectation,
@@ -53,8 +56,7 @@ from fpsolve.case.sections import (
     VarySection,
     as_kind,
 )
-from fpsolve.case.toml import Place, dotted, read_document
-from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
+from fpsolve.case.toml import Document, Place, dotted, read_document
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
@@ -70,7 +72,7 @@ from fpsolve.exponent.quantities import (
 )
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import is_control
-from fpsolve.model.faults import table_of
+from fpsolve.model.faults import shown, table_of, written_path
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
@@ -116,11 +118,6 @@ class Curve:
             return self.problem is not None
         except ValueError:
             return False
-
-    @property
-    def oscillator(self) -> Any:
-        """The system."""
-        return self.problem.system
 
     @property
     def noise(self) -> Noise:
@@ -220,12 +217,7 @@ class Case(Section):
     ] = ResponseSection()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
-    _text: str = PrivateAttr(default="")
-
-    @property
-    def oscillator(self) -> Any:
-        """The system."""
-        return self.system
+    _document: Document = PrivateAttr(default_factory=Document)
 
     @cached_property
     def problem(self) -> Problem:
@@ -248,12 +240,16 @@ class Case(Section):
     @property
     def text(self) -> str:
         """The file, as it was read."""
-        return self._text
+        return self._document.text
 
     @property
     def overrides(self) -> tuple[str, ...]:
         """What the command line has changed, as it was typed."""
         return self._overrides
+
+    def refusal(self, sentence: str, *path: str | int) -> CaseError:
+        """What is wrong with what stands at a path, told with its line."""
+        return CaseError(str(self.path), [self._document.fault(path, written_path(path), sentence)])
 
     @property
     def name(self) -> str:
@@ -456,7 +452,8 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     document = read_document(path, overrides, options)
     faults, data = document.faults, document.data
     faults += (document.fault(path, dotted(path), told) for path, told in take_removed(data))
-    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}
+    kinds = kinds_of(data)
+    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds}
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it
@@ -468,14 +465,18 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
             raise CaseError(
                 str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
             ) from None
-        fields = sections_of(Case.model_fields, data)
-        faults += (document.fault(*fault) for fault in explain(error, fields, parameters_of({}, context) or {}))
+        fields = dict[str, FieldInfo]()
+        for name, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
+            section = system_of(data) if name == "system" else name
+            fields[section] = copy(field)
+            fields[section].annotation = kinds.get(section, field.annotation)
+        faults += (document.fault(*fault) for fault in explain(error, fields))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     faults += _faults_of_name(Path(path).stem)
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
-    case._path, case._overrides, case._text = Path(path), tuple(overrides), document.text
+    case._path, case._overrides, case._document = Path(path), tuple(overrides), document
     return case
 
 

@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, real_array, shown
+from fpsolve.arrays import FloatArray, real_array
 from fpsolve.case.explain import refuse
 from fpsolve.files import Unreadable, Words, read_bytes
+from fpsolve.model.faults import shown
 from fpsolve.model.systems.modal import MOST_MODES
 
 KEYS = ("mass", "stiffness", "damping", "gyroscopic", "circulatory", "stiffness_noise", "damping_noise")

@@ -26,7 +26,7 @@ from pydantic import (
 
 from fpsolve.analysis.axis import Axis, Scale, check_range
 from fpsolve.analysis.excursions import STATIONARY
-from fpsolve.analysis.target import EXAMPLES, Target, target_of
+from fpsolve.analysis.target import Target, target_of
 from fpsolve.arrays import FloatArray
 from fpsolve.case.explain import (
     BY_KIND,
@@ -35,18 +35,14 @@ from fpsolve.case.explain import (
     TABLE,
     WORD,
     Refusal,
-    is_list,
-    is_number,
     refuse,
-    shown,
-    shown_with_kind,
 )
 from fpsolve.case.keys import leaves
-from fpsolve.errors import MeshError
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
+from fpsolve.model.faults import shown
 from fpsolve.model.parameters import STRICT, Section, parameter
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
@@ -81,6 +77,7 @@ _MOST_ALONG = 1000
 """Largest number of places along an axis of the density of the response."""
 _MOST_PLACES = 4_000_000
 """Largest number of places at which it is written."""
+UNCERTAIN = '[uncertain] with "noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
 MOST_NAMED = 8
 """Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
 _LINES = 'lines = ["lyapunov_exponent = 0", "moment(2) = 0"]'
@@ -244,30 +241,34 @@ class VarySection(BaseModel):
 
     mode: Annotated[
         Literal["product", "zip"],
-        Field(description="product: all combinations, the last key fastest; zip: the n-th values of all keys together"),
+        parameter(
+            "product: all combinations, the last key fastest; zip: the n-th values of all keys together", 'mode = "zip"'
+        ),
     ] = "product"
-    file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
-        ""
-    )
+    file: Annotated[
+        Text, parameter("a file of sets: a header that names the keys, and a row for each set", 'file = "sets.csv"')
+    ] = ""
 
 
-class StandardDeviation(BaseModel):
+class StandardDeviation(Section):
     """{ sd }: a standard deviation in the unit of the parameter."""
 
-    model_config = STRICT
-
-    sd: Annotated[float, Field(gt=0, description="standard deviation")]
+    sd: Annotated[float, parameter("standard deviation", "sd = 0.02", gt=0)]
 
 
-_Deviation = Annotated[float, Field(gt=0)] | StandardDeviation
-"""How uncertain a parameter is: a share of its value, or a standard deviation."""
+Deviation = Annotated[
+    Annotated[float, Field(gt=0), Tag(NUMBER)] | Annotated[StandardDeviation, Tag(TABLE)],
+    BY_KIND,
+    parameter("a share of the value > 0, or a standard deviation > 0", UNCERTAIN),
+]
+"""How uncertain a parameter is."""
 
 
 class UncertainSection(BaseModel):
     """How uncertain parameters are: by their keys, with quotes and dots or in tables."""
 
     model_config = OPEN
-    __pydantic_extra__: dict[str, _Deviation | dict[str, _Deviation | dict[str, Any]]]
+    __pydantic_extra__: dict[str, Deviation | dict[str, Deviation | dict[str, Any]]]
 
 
 class MeshSection(Section):
@@ -293,15 +294,7 @@ class MeshSection(Section):
         if self.file is None:
             stated = self.model_dump(exclude_none=True)
             return make_mesh(**stated) if stated else None
-        from fpsolve.fem.phase import vertices_at  # takes a while to import
-
-        path = folder / self.file
-        mesh = read_mesh(path)
-        try:
-            vertices_at(mesh.phi_lines, math.pi / 2)
-        except MeshError as failure:
-            raise MeshError(f"{path}: {failure}") from failure
-        return mesh
+        return read_mesh(folder / self.file)
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -339,18 +332,17 @@ class MomentAt(Section):
     moment: Annotated[float, parameter("order of the moment", "moment = 2.0")]
 
 
-def _limits(value: Any) -> tuple[float, float]:
-    if is_list(value) and len(value) == 2 and all(map(is_number, value)):
-        start, stop = value
-        if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
-            return float(start), float(stop)
-    raise ValueError(
-        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, "
-        "which differ in their first 9 digits; write, for example, [0.0, 4.0]"
-    )
+def _increasing(ends: tuple[float, float]) -> tuple[float, float]:
+    size = max(map(abs, ends))
+    if size > _LARGEST or not ends[1] - ends[0] > _APART * size:
+        raise ValueError(
+            f"got {shown(ends)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, which "
+            "differ in their first 9 digits; write, for example, [0.0, 4.0]"
+        )
+    return ends
 
 
-Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
+Limits = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_increasing)]
 
 
 class FigureSection(Section):
@@ -475,25 +467,6 @@ class OutputSection(Section):
         return self
 
 
-def _targets(value: Any) -> Any:
-    """The entries of `lines` as `Target`s; those already made are left."""
-    if not is_list(value) or not value:
-        raise ValueError(f"got {shown(value)}; must be a list with one entry at least; write, for example, {_LINES}")
-    made, refusals = list[Target](), list[Refusal]()
-    for i, entry in enumerate(value):
-        try:
-            target = entry if isinstance(entry, Target) else target_of(entry)
-        except (ValueError, TypeError):
-            known = f"must be {EXAMPLES}, all numbers finite and the order of a moment not 0"
-            refusals.append(((i,), entry, f"got {shown(entry)}; {known}; write one of these"))
-            continue
-        if target in made:
-            refusals.append(((i,), entry, f"got {shown(entry)} twice; lines must differ; remove one of them"))
-        made.append(target)
-    refuse(refusals)
-    return tuple(made)
-
-
 class ChartSection(Section):
     """[chart]: a frame of two parameters, and the lines in it."""
 
@@ -502,9 +475,9 @@ class ChartSection(Section):
     ]
     y: Annotated[Axis, as_kind(Axis), parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
     lines: Annotated[
-        tuple[Target, ...],
-        BeforeValidator(_targets, json_schema_input_type=Annotated[tuple[str, ...], Field(min_length=1)]),
-        parameter("what holds on each line", _LINES),
+        tuple[Annotated[Target, BeforeValidator(target_of, json_schema_input_type=str)], ...],
+        parameter("what holds on each line", _LINES, strict=False, min_length=1),
+        AfterValidator(_distinct),
     ]
     nodes: Annotated[
         int | None,

@@ -158,8 +158,8 @@ class Document:
         text: the file as it was read.
     """
 
-    data: dict[str, Any]
-    places: dict[str, Place]
+    data: dict[str, Any] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     text: str = ""
 

@@ -21,6 +21,7 @@ from fpsolve.results.simulate import SIMULATION
 from fpsolve.results.tables import TABLES
 from fpsolve.signals import signals_held
 from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.question import refuse_mesh
 from fpsolve.solve.simulate import refuse_obstacles
 from fpsolve.tell import solved as results
 from fpsolve.tell.notes import MONTE_CARLO, notes
@@ -110,6 +111,7 @@ def run_case(
     """
     if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
         raise FpsolveError(f"{case.path}: {refused}")
+    refuse_mesh(case)
     if monte_carlo:
         refuse_obstacles(case)
     simulations = Simulations(case)

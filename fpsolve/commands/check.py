@@ -23,7 +23,7 @@ from fpsolve.solve.check import (
 )
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.moments import QUESTION as MOMENTS
-from fpsolve.solve.question import Job, Numerics
+from fpsolve.solve.question import Job, Numerics, refuse_mesh
 from fpsolve.tell.check import agreement, show
 from fpsolve.tell.notes import notes
 from fpsolve.tell.progress import SETS, SILENT, Phase, Watch
@@ -74,8 +74,10 @@ def check(
     """
 
     code, loaded = 0, options.load(cases)
-    for case in loaded if hierarchy else ():
-        refuse_no_hierarchy(case)
+    for case in loaded:
+        refuse_mesh(case)
+        if hierarchy:
+            refuse_no_hierarchy(case)
     pool = options.pool(loaded)
     for case in loaded:
         outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=options.watch())

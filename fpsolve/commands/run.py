@@ -41,6 +41,7 @@ def run(
     """
     from fpsolve.commands.cases import run_case
     from fpsolve.results.tables import whole_summary
+    from fpsolve.solve.question import refuse_mesh
     from fpsolve.solve.simulate import refuse_obstacles
     from fpsolve.tell.notes import left_out
     from fpsolve.tell.solved import done_of, known_of
@@ -48,8 +49,9 @@ def run(
 
     code = 0
     loaded = options.load(cases, {"--all": 'output.quantities="all"'} if everything else {})
-    if monte_carlo:
-        for case in loaded:
+    for case in loaded:
+        refuse_mesh(case)
+        if monte_carlo:
             refuse_obstacles(case)
     pool = options.pool(loaded)
     for case in loaded:
