@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import (
@@ -272,13 +272,23 @@ class Case(Section):
         return choose(self.problem)
 
     @cached_property
+    def available(self) -> tuple[str, ...]:
+        """The names of what there is of this case; the response if some of the first curves have one."""
+        if not self.method.has_pairs:
+            return MOMENT.name, SENSITIVITIES
+        missing = {*(() if self.problem.linear.jumps else OF_IMPACTS)}
+        missing |= {EIGENFUNCTIONS} if self.method.no_picture else set()
+        missing |= set() if self.responds else {RESPONSE}
+        return tuple(name for name in QUANTITY_NAMES if name not in missing)
+
+    @cached_property
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
+        if self.output.quantities == EVERYTHING:
+            return self.available
         if self.output.names is not None:
-            has_all = self.output.lists_quantities or self.method.has_pairs
-            return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
-        named = {*CHEAP} if self.method.has_pairs else {MOMENT.name}
-        named |= {*(CHEAP_OF_WALLS if self.problem.linear.jumps else ())}
+            return self.output.names
+        named = {*CHEAP, *CHEAP_OF_WALLS}.intersection(self.available)
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
         usual = {
@@ -287,19 +297,15 @@ class Case(Section):
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
             or (self.output.eigenfunctions is None and self.method.pictures.is_seen),
         }
+        named -= {RESPONSE} if self.response.off else set()
         return tuple(name for name in QUANTITY_NAMES if name in named or usual.get(name))
 
     @property
     def unasked(self) -> tuple[str, ...]:
         """What else there is of this case, where it leaves open what is computed."""
-        if self.output.names is not None:
-            return ()
-        is_there = {RESPONSE: False, DERIVATIVE.name: False, EIGENFUNCTIONS: not self.method.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
-        if not self.method.has_pairs:
-            is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
-        known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
-        return tuple(name for name in QUANTITY_NAMES if name not in known and is_there.get(name, True))
+        known = {*self.asked, DERIVATIVE.name, RESPONSE}
+        known -= set() if self.output.asks_for_eigenfunctions else {EIGENFUNCTIONS}
+        return tuple(each for each in self.available if self.output.names is None and each not in known)
 
     @property
     def shown(self) -> FloatArray:
@@ -321,20 +327,15 @@ class Case(Section):
         return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P), default=USUAL_P))
 
     @property
-    def has_response(self) -> bool:
-        """Whether the stationary response is computed: it is named, or some of at most ten curves are nonlinear."""
-        is_named = self.output.quantities != EVERYTHING
-        return RESPONSE in self.asked and not self.response.off and (is_named or self.responds)
-
-    @property
     def leaves_out_response(self) -> bool:
-        """Whether it is not, as there are too many curves and nobody names it."""
-        return self.output.names is None and RESPONSE not in self.asked and self.responds
+        """Whether no response is computed, as there are too many curves and nobody names it."""
+        return self.output.names is None and self.responds and RESPONSE not in self.asked
 
     @cached_property
     def responds(self) -> bool:
-        """Whether some of the first curves are."""
-        return any(each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
+        """Whether some of the first curves have a response, and it is not left out."""
+        nonlinear = (each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
+        return not self.response.off and any(nonlinear)
 
     @property
     def differentiated(self) -> FloatArray:
@@ -403,12 +404,12 @@ class Case(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _is_complete(cls, data: Any) -> Any:
+    def _is_complete(cls, data: dict[str, object]) -> dict[str, object]:
         """With one system; without orders of moments where other quantities are named."""
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
-        named: Any = table_of(data.get("output")).get("quantities")
+        named = table_of(data.get("output")).get("quantities")
         is_of_p = not is_list(named) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
 
@@ -428,7 +429,7 @@ class Case(Section):
 
     @field_validator(*REFUSALS)
     @classmethod
-    def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
+    def _agrees_with_those_before(cls, section: object, info: ValidationInfo) -> object:
         refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
         return section
 

@@ -236,7 +236,7 @@ def fields_of(annotation: object) -> Mapping[str, FieldInfo]:
     return {}
 
 
-def table_of(value: object) -> Mapping[str, Any]:
+def table_of(value: object) -> Mapping[str, object]:
     """A value of a case file that is a table; an empty one where it is none."""
     return value if isinstance(value, dict) else {}
 

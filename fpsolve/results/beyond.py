@@ -27,7 +27,7 @@ def beyond_tables(case: Case, result: CurveResult) -> dict[str, Any]:
         found["classes"] = [_class(each) for each in result.classes]
     if EXCURSIONS in case.asked:
         found[EXCURSIONS] = result.excursion and _excursion(case, result.excursion)
-    if case.has_response:
+    if RESPONSE in case.asked:
         found[RESPONSE] = result.response and _response(result.response)
     if SENSITIVITIES in case.asked:
         found[SENSITIVITIES] = result.sensitivities and _sensitivities(result.sensitivities)
