@@ -70,7 +70,7 @@ from fpsolve.exponent.quantities import (
     OF_IMPACTS,
     STABILITY_INDEX,
 )
-from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.mesh import CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
 from fpsolve.model.faults import shown, table_of, written_path
 from fpsolve.model.noise import Noise
@@ -276,10 +276,9 @@ class Case(Section):
         """The names of what there is of this case; the response if some of the first curves have one."""
         if not self.method.has_pairs:
             return MOMENT.name, SENSITIVITIES
-        missing = {*(() if self.problem.linear.jumps else OF_IMPACTS)}
-        missing |= {EIGENFUNCTIONS} if self.method.no_picture else set()
-        missing |= set() if self.responds else {RESPONSE}
-        return tuple(name for name in QUANTITY_NAMES if name not in missing)
+        is_there = dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
+        is_there |= {EIGENFUNCTIONS: not self.method.no_picture, RESPONSE: self.responds}
+        return tuple(name for name in QUANTITY_NAMES if is_there.get(name, True))
 
     @cached_property
     def asked(self) -> tuple[str, ...]:
@@ -399,8 +398,11 @@ class Case(Section):
         return f"{title}\nwith {', '.join(told)}" if told else title
 
     def cylinder_mesh(self) -> CylinderMesh | None:
-        """The mesh that the case states; None leaves it to the solver."""
-        return self.mesh.mesh(self.path.parent)
+        """The mesh that the case states, its file sought beside the case; None leaves it to the solver."""
+        stated = self.mesh.model_dump(exclude_none=True)
+        if self.mesh.file is not None:
+            return read_mesh(self.path.parent / self.mesh.file)
+        return make_mesh(**stated) if stated else None
 
     @model_validator(mode="before")
     @classmethod
@@ -471,7 +473,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
             section = system_of(data) if name == "system" else name
             fields[section] = copy(field)
             fields[section].annotation = kinds.get(section, field.annotation)
-        faults += (document.fault(*fault) for fault in explain(error, fields))
+        faults += (document.fault(*fault) for fault in explain(error.errors(), fields))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     faults += _faults_of_name(Path(path).stem)

@@ -14,19 +14,11 @@ from fpsolve.model.faults import MISSING, TableError, entry_of, fields_of, guess
 from fpsolve.model.parameters import STRICT, Section, parameter
 
 _OWN = "own sentence"
-LIST = "<list>"
-"""Tag of a list, in a union that is told apart by what TOML has there."""
-TABLE = "<table>"
-"""Tag of a table."""
-WORD = "<word>"
-"""Tag of a text."""
-NUMBER = "<number>"
-"""Tag of a number."""
-TAGS = (LIST, TABLE, WORD, NUMBER)
-"""Parts of pydantic's error locations that are no keys."""
+LIST, TABLE, WORD, NUMBER = "<list>", "<table>", "<word>", "<number>"
+"""Tags of what TOML has there, in a union that is told apart by that; parts of pydantic's places that are no keys."""
 _TAGS: Mapping[type, str] = {list: LIST, tuple: LIST, dict: TABLE, str: WORD, int: NUMBER, float: NUMBER}
 BY_KIND = Discriminator(lambda value: _TAGS.get(type(value), TABLE if isinstance(value, Section) else None))
-"""How a union is told apart: by what TOML has there."""
+"""How such a union is told apart."""
 DEPENDENT = "cannot be judged, as the kinds of the system and the noise are not known; correct these"
 """Of a section; which kinds are wrong is another fault."""
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
@@ -41,46 +33,35 @@ Refusal = tuple[Path, object, str]
 Fields = Mapping[str, FieldInfo]
 
 
-def refuse(refusals: Iterable[Refusal], others: Iterable[InitErrorDetails] = ()) -> None:
-    """Raise all refusals of a validator, and other errors, at once; without any, do nothing."""
+def refuse(refusals: Iterable[Refusal]) -> None:
+    """Raise all refusals of a validator at once; without any, do nothing."""
     details = [
         InitErrorDetails(type=PydanticCustomError(_OWN, text), loc=path, input=value) for path, value, text in refusals
     ]
-    if details := [*others, *details]:
+    if details:
         raise ValidationError.from_exception_data("case", details)
 
 
-def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
-    """What a table says of some fields. Raises `ValidationError` in our words."""
+def validated(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
+    """What a table says of some fields. Raises `ValidationError`."""
     known: dict[str, Any] = {name: (field.annotation, field) for name, field in fields.items()}
     model: type[BaseModel] = create_model("table", __config__=STRICT, **known)
-    try:
-        made = model.model_validate(table)
-    except ValidationError as error:
-        raise explained(error, fields) from None
+    made = model.model_validate(table)
     return {name: vars(made)[name] for name in table}
 
 
-def explained(error: ValidationError, fields: Fields) -> ValidationError:
-    """An error in our words."""
+def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
+    """The same; what is wrong is in our words."""
     try:
-        refuse((path, None, told) for path, _, told in explain(error, fields))
-    except ValidationError as told:
-        return told
-    return error
+        return validated(fields, table)
+    except ValidationError as error:
+        refuse(told(error.errors(), fields))
+        raise
 
 
-def details_of(error: ValidationError, *place: str | int) -> list[InitErrorDetails]:
-    """The faults of an error, at a place around its own, to be raised again."""
-    return [
-        InitErrorDetails(
-            type=PydanticCustomError(_OWN, each["msg"]) if each["type"] == _OWN else each["type"],
-            loc=(*place, *each["loc"]),
-            input=each["input"],
-            ctx=each.get("ctx", {}),
-        )
-        for each in faults_in(error)
-    ]
+def told(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[Refusal]:
+    """What pydantic found, in our words."""
+    return ((path, None, text) for path, _, text in explain(details, fields))
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -93,34 +74,21 @@ def is_list(value: object) -> TypeGuard[list[object] | tuple[object, ...]]:
     return isinstance(value, list | tuple)
 
 
-def quoted(names: Iterable[str]) -> str:
-    """Names as TOML lists them."""
-    return ", ".join(f'"{name}"' for name in names)
-
-
-def faults_in(error: ValidationError) -> Iterator[ErrorDetails]:
-    """What pydantic found, without calling a list too short only because its entries are wrong."""
-    return (
-        each
-        for each in error.errors(include_url=False)
-        if each["type"] != "too_short" or len(each["input"]) < each["ctx"]["min_length"]
-    )
-
-
-def explain(error: ValidationError, fields: Fields) -> Iterator[tuple[Path, str, str]]:
+def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[Path, str, str]]:
     """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence.
 
-    What is missing where a key is misspelt is not another fault.
+    What is missing where a key is misspelt is not another fault, nor is a list too short whose entries are wrong.
 
     Args:
-        error: with paths from a model.
+        details: with paths from a model.
         fields: of that model.
     """
     faults = list[tuple[Path, ErrorDetails]]()
-    for each in faults_in(error):
+    for each in details:
         reason = each.get("ctx", {}).get("error")
         inside = reason.path if isinstance(reason, TableError) else ()
-        faults.append((tuple(part for part in (*each["loc"], *inside) if part not in TAGS), each))
+        if each["type"] != "too_short" or len(each["input"]) < each["ctx"]["min_length"]:
+            faults.append((tuple(part for part in (*each["loc"], *inside) if part not in _TAGS.values()), each))
     misspelt = set[Path]()
     for path, detail in faults:
         if detail["type"] in _UNKNOWN and (known := guess(str(path[-1]), _known_keys(path, fields))):

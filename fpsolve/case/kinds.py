@@ -14,9 +14,9 @@ from typing import Any, Literal
 
 from pydantic import ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
-from pydantic_core import InitErrorDetails
+from pydantic_core import ErrorDetails
 
-from fpsolve.case.explain import UNBOUNDED, Refusal, checked, details_of, explained, refuse
+from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
 from fpsolve.case.matrices import with_matrices
 from fpsolve.model.faults import TableError, fields_of, nearest, shown_with_kind, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
@@ -52,13 +52,13 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         refuse(_misnamed(names, system.noise_sections))
     if not names:
         return made_of(half, table)
-    made, faults = dict[str, Any](), list[InitErrorDetails]()
+    made, faults = dict[str, Any](), list[Refusal]()
     for name in names:
         try:
             made[name] = made_of(half, table[name])
         except ValidationError as error:
-            faults += details_of(error, name)
-    refuse([], faults)
+            faults += (((name, *each["loc"]), each["input"], each["msg"]) for each in error.errors())
+    refuse(faults)
     return noises_of(made)
 
 
@@ -87,34 +87,25 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
 
 
 def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
-    """What a table describes. Raises `ValidationError` with all that is wrong with it."""
-    kind = _kind(half, table)
+    """What a table describes. Raises `ValidationError` with all that is wrong with it, in our words."""
+    kind, faults = _kind(half, table), list[ErrorDetails]()
+    known = {**dict.fromkeys(table_of(table.get("parameters")), UNBOUNDED), **fields_of(kind)}
+    given = {key: value for key, value in table.items() if key != "kind"}
+    is_own = {key: key not in kind.stated and (key in known or kind.takes(key, table)) for key in given}
     try:
-        return _made(kind, {key: value for key, value in table.items() if key != "kind"})
+        stated = validated(kind.stated, {key: value for key, value in given.items() if not is_own[key]})
     except ValidationError as error:
-        named = dict.fromkeys(table_of(table.get("parameters")), UNBOUNDED)
-        raise explained(error, {**named, **fields_of(kind)}) from None
-
-
-def _made(kind: type[Parametrised], table: dict[str, object]) -> Parametrised:
-    """A system or a noise of a kind. Raises `ValidationError`."""
-    foreign = [key for key in table if key not in fields_of(kind) and not kind.takes(key, table)]
-    faults = [InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=table.pop(key)) for key in foreign]
-    given = {word: table.pop(word) for word in kind.stated if word in table}
-    try:
-        table |= checked(kind.stated, given)
-    except ValidationError as error:
-        faults += details_of(error)
+        faults, stated = error.errors(), {}
     if not (faults and any(field.is_required() for field in kind.stated.values())):
         try:
-            made = kind.from_table(table)
+            made = kind.from_table({key: value for key, value in given.items() if is_own[key]} | stated)
         except ValidationError as error:
-            faults += details_of(error)
+            faults += error.errors()
         except (ValueError, TypeError) as error:
             if not faults:
                 path, text = (error.path, error.text) if isinstance(error, TableError) else ((), str(error))
                 refuse([(path, None, text)])
-    refuse([], faults)
+    refuse(told(faults, known))
     return made
 
 

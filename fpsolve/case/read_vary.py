@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from operator import itemgetter
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -119,13 +119,14 @@ def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
             cells = [cell.strip() for cell in row]
             if any(cells) and not header:
                 if len(cells) == 1 and re.search(r"[;\t]", cells[0]):
-                    mark = "semicolons" if ";" in cells[0] else "tabs"
-                    raise Unreadable(f"is separated by {mark}; write commas, and decimal points in the numbers", line)
+                    text = "is separated by semicolons or tabs; write commas, and decimal points in the numbers"
+                    raise Unreadable(text, line)
                 first, header = line, cells
                 twice = (key for i, key in enumerate(header) if key in header[:i])
                 faults += ((line, f"{key}: stands twice in the header; remove one of them") for key in twice)
             elif any(cells) and len(cells) != len(header):
-                faults.append((line, _wrong_length(cells, header)))
+                told = f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key"
+                faults.append((line, f"{told}; write commas between them, and decimal points in the numbers"))
             elif any(cells):
                 rows[line] = [*map(_number, cells)]
             line = reader.line_num + 1
@@ -146,15 +147,6 @@ def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
             faults.append((at, f"{shortened(str(key)) or 'a column'}: {each['msg']}"))
     refuse((("file",), None, f"{file}:{at}: {text}") for at, text in sorted(faults, key=itemgetter(0)))
     return Vary(columns, "zip", file, lines)
-
-
-def _wrong_length(cells: Sequence[str], header: Sequence[str]) -> str:
-    remedy = "remove the others, and write decimal points, not commas, in the numbers"
-    if len(cells) < len(header):
-        remedy = "add those that are missing"
-    if len(cells) == 1 and ";" in cells[0]:
-        remedy = "write commas between them, and decimal points in the numbers"
-    return f"has {len(cells)} cell{'s' * (len(cells) > 1)}; must have {len(header)}, one for each key; {remedy}"
 
 
 def _number(cell: str) -> float | str:

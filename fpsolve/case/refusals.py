@@ -6,7 +6,6 @@ whether the case varies anything.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -15,7 +14,7 @@ import numpy as np
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
-from fpsolve.case.explain import Refusal, quoted
+from fpsolve.case.explain import Refusal
 from fpsolve.case.kinds import problem_of
 from fpsolve.case.sections import (
     EXCURSIONS,
@@ -32,41 +31,31 @@ from fpsolve.case.sections import (
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.model.faults import nearest, shown
+from fpsolve.model.faults import nearest, quoted, shown
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order_or_none
 
 Known = Mapping[str, Any]
 MAX_CURVES = 100_000
-_MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
     """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
-    problem = problem_of(valid)
-    method = None if problem is None else choose(problem)
-    is_told = not context.get("varies", False) or (method is not None and not method.has_pairs)
-    is_told &= method is None or method.is_computed
-    if text := _unsolvable({**valid, "moments": moments}, {}, with_moments=is_told):
-        yield (), None, text
+    if problem := problem_of(valid):
+        method = choose(problem)
+        is_told = method.is_computed and not (context.get("varies") and method.has_pairs)
+        if text := obstacle(problem, {}, moments.values, with_moments=is_told):
+            yield (), None, text
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
+    problem, moments = problem_of(valid), valid.get("moments")
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
-    elif text := _unsolvable(valid, vary.sets[0]):
-        yield ("file",) if vary.file else (), None, vary.line_of(1) + text
-
-
-def _unsolvable(valid: Known, varied: Varied, *, with_moments: bool = False) -> str:
-    """Why a set contradicts itself or overflows, or why some Λ(p) of it is not computed, or nothing."""
-    problem = problem_of(valid)
-    if problem is None or "moments" not in valid:
-        return ""
-    reason = obstacle(problem, varied, valid["moments"].values, with_moments=with_moments)
-    return _with(varied) + reason if reason else ""
+    elif problem and moments and (text := obstacle(problem, vary.sets[0], moments.values, with_moments=False)):
+        yield ("file",) if vary.file else (), None, vary.line_of(1) + _with(vary.sets[0]) + text
 
 
 def _with(varied: Varied) -> str:
@@ -79,17 +68,15 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
     try:
         problem = base.at(varied)
         with np.errstate(all="ignore"):
-            factors = [math.exp(each * jump.log_factor) for jump in problem.linear.jumps for each in extremes]
+            factors = [np.exp(each * jump.log_factor) for jump in problem.linear.jumps for each in extremes]
             theory = second_order_or_none(problem)
             if theory is not None:
                 factors += [*theory.scale.moment(p), theory.stability_index if theory.quadratic else 0.0]
-            sizes = np.array(factors)
     except ValueError as error:
         return said(error)
-    except OverflowError:  # of R^p
-        sizes = np.array([math.inf])
-    if not np.all(np.isfinite(sizes)):
-        return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
+    if not np.all(np.isfinite(factors)):
+        text = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
+        return f"Eqs. (37)-(38) or R^p overflow; {text}"
     if with_moments:
         method = choose(problem)
         for each in extremes if method.has_pairs else p.tolist():
@@ -145,28 +132,28 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
-    orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
-    yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
-    problem = problem_of(valid)
-    numbers = problem.linear.response.numbers if problem else {}
-    for i, name in ((i, each.of_response) for i, each in enumerate(expect) if each.of_response and problem):
-        if name not in numbers:
-            names = quoted(f"{RESPONSE}.{each}" for each in numbers)
-            text = f'got "{RESPONSE}.{name}"; must be one of {names} for this system; choose one of these'
-            yield (i, "quantity"), name, text
+    problem, remove = problem_of(valid), _without("expect")
     vary: Vary | None = valid.get("vary")
-    if vary is None:
-        return
-    for i, key, value in ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items()):
-        if key not in vary.keys:
-            guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
-            text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
-            yield (i, "where", key), value, text
-        elif not any(same(value, other) for other in vary.values(key)):
-            is_possible = (type(value) is str) == vary.is_text(key)
-            remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
-            text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
-            yield (i, "where", key), value, text
+    numbers = problem.linear.response.numbers if problem else {}
+    for i, item in enumerate(expect):
+        if item.p is not None:
+            yield from _of_orders(valid, [((i, "p"), item.p)], f"choose one of them, {remove}")
+        if problem and item.of_response and item.of_response not in numbers:
+            names = quoted(f"{RESPONSE}.{each}" for each in numbers)
+            text = f'got "{item.quantity}"; must be one of {names} for this system; choose one of these'
+            yield (i, "quantity"), item.quantity, text
+        if vary is None:
+            continue
+        for key, value in item.where.items():
+            if key not in vary.keys:
+                guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
+                text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {remove}"
+                yield (i, "where", key), value, text
+            elif not any(same(value, other) for other in vary.values(key)):
+                is_possible = (type(value) is str) == vary.is_text(key)
+                remedy = f"add it to [vary], {remove}" if is_possible else "write one of these"
+                text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
+                yield (i, "where", key), value, text
 
 
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:

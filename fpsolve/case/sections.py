@@ -6,9 +6,7 @@ What keys of the system, the noise and the budget mean stands where these do; th
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -19,7 +17,6 @@ from pydantic import (
     ConfigDict,
     Field,
     Tag,
-    ValidatorFunctionWrapHandler,
     WrapValidator,
     model_validator,
 )
@@ -40,7 +37,7 @@ from fpsolve.case.explain import (
 from fpsolve.case.keys import leaves
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
-from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE
 from fpsolve.messages import is_control
 from fpsolve.model.faults import shown
 from fpsolve.model.parameters import STRICT, Section, parameter
@@ -89,29 +86,14 @@ Varied = Mapping[str, Value]
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
-KnownName = Literal[
-    QuantityName,
-    "response.amplitude",
-    "response.amplitude_squared",
-    "response.amplitude_fourth",
-    "response.x_squared",
-    "response.v_squared",
-    "response.energy",
-    "response.impact_rate",
-]
-"""What an expectation may be of; the numbers of the response have its name before them."""
-OF_VARIABLE = r"^response\.[A-Za-z_][A-Za-z0-9_]*_squared$"
-"""The mean square of a variable of [system]."""
-
-
-def _expected(value: Any, known: ValidatorFunctionWrapHandler) -> Any:
-    """The name of a quantity; which variables there are is not known here."""
-    return value if type(value) is str and re.match(OF_VARIABLE, value) else known(value)
-
-
 ExpectedName = Annotated[
-    KnownName, WrapValidator(_expected, json_schema_input_type=KnownName | Annotated[str, Field(pattern=OF_VARIABLE)])
+    QuantityName,
+    WrapValidator(
+        lambda value, known: value if str(value).startswith(f"{RESPONSE}.") else known(value),
+        json_schema_input_type=QuantityName | Annotated[str, Field(pattern=rf"^{RESPONSE}\.")],
+    ),
 ]
+"""What an expectation may be of; the numbers of the response, which its system decides, have its name before them."""
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
@@ -159,6 +141,14 @@ def flat(table: Mapping[str, Any], whole: Iterable[str] = ()) -> dict[str, Any]:
     return result
 
 
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list without entries that stand twice."""
+    first = dict[Any, int]()
+    twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
+    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
+    return values
+
+
 class Sweep(Section):
     """{ start, stop, num, scale }: numbers a constant step or a constant factor apart, both ends included."""
 
@@ -189,7 +179,7 @@ RANGE = frozenset(Sweep.__pydantic_fields__)
 Names: Any = Annotated[
     tuple[Literal[*QUANTITY_NAMES], ...],  # type: ignore[valid-type]
     Field(strict=False, min_length=1),
-    AfterValidator(lambda names: _distinct(names)),
+    AfterValidator(_distinct),
 ]
 
 
@@ -289,13 +279,6 @@ class MeshSection(Section):
         float | None, parameter("upper end of the noise, in standard deviations", "xi_max = 8.0", gt=0)
     ] = None
 
-    def mesh(self, folder: Path) -> CylinderMesh | None:
-        """The mesh, its file sought from `folder`; None where nothing is stated."""
-        if self.file is None:
-            stated = self.model_dump(exclude_none=True)
-            return make_mesh(**stated) if stated else None
-        return read_mesh(folder / self.file)
-
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         numbers = ", ".join(self.model_dump(exclude_none=True, exclude={"file"}))
@@ -316,14 +299,6 @@ class MonteCarloSection(Section):
     seed: Annotated[int, parameter("seed of the random numbers", "seed = 0", ge=0)] = 0
     estimator: Annotated[Estimator | None, parameter("how moments are estimated", 'estimator = "population"')] = None
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
-
-
-def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A list without entries that stand twice."""
-    first = dict[Any, int]()
-    twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
-    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
-    return values
 
 
 class MomentAt(Section):
@@ -418,14 +393,8 @@ class OutputSection(Section):
         parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
     ] = None
     eigenfunctions: Annotated[
-        Values | None,
-        parameter(
-            "the p whose eigenfunctions are written for ParaView",
-            "eigenfunctions = [1.0, 2.0]",
-            strict=False,
-            max_length=MAX_MOMENTS,
-        ),
-        AfterValidator(lambda values: values and _distinct(values)),
+        Annotated[Values, Field(strict=False, max_length=MAX_MOMENTS), AfterValidator(_distinct)] | None,
+        parameter("the p whose eigenfunctions are written for ParaView", "eigenfunctions = [1.0, 2.0]"),
     ] = None
     figure: Annotated[bool, parameter("whether the figure is drawn", "figure = false")] = True
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
@@ -560,7 +529,9 @@ class ResponseSection(Section):
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Annotated[ExpectedName, parameter("what is checked", 'quantity = "moment"')]
+    quantity: Annotated[
+        ExpectedName, parameter("what is checked; also response.energy and the like", 'quantity = "moment"')
+    ]
     p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
     value: Annotated[float, parameter("the expected value", "value = 0.01416")]
     rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None

@@ -47,8 +47,6 @@ def uncertain_of(value: object, info: ValidationInfo) -> Uncertain:
         return value
     if not isinstance(value, dict):
         raise ValueError(f"got {shown_with_kind(value)}; must be a table; write, for example, {UNCERTAIN}")
-    if not value:
-        raise ValueError(f"names no parameter; write, for example, {UNCERTAIN}")
     if (problem := problem_of(info.data)) is None:
         refuse([((), value, DEPENDENT)])
         return Uncertain()

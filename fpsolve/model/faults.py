@@ -167,9 +167,6 @@ def guess(name: str, known: Iterable[str]) -> str | None:
 
 def accepted(field: FieldInfo) -> str:
     """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
-    texts = choices(field.annotation)
-    if texts:
-        return "one of " + ", ".join(f'"{text}"' for text in texts)
     bounds = " and ".join(f"{_SIGNS[name]} {_number(bound)}" for name, bound in bounds_in(field).items())
     return f"{_with_article(_not_empty(field.metadata) + _noun(field.annotation))} {bounds}".rstrip()
 
@@ -250,6 +247,11 @@ def written_path(path: Iterable[str | int]) -> str:
     return text
 
 
+def quoted(names: Iterable[str]) -> str:
+    """Names as TOML lists them."""
+    return ", ".join(f'"{name}"' for name in names)
+
+
 def _with_article(noun: str) -> str:
     return noun if noun.startswith(('"', "one of")) else f"a {noun}"
 
@@ -266,8 +268,7 @@ def _noun(annotation: Any, plural: str = "") -> str:
         first, *others = (_noun(argument, plural) for argument in arguments if argument is not NoneType)
         return " or ".join([first, *(others if plural else map(_with_article, others))])
     if texts := choices(annotation):
-        names = ", ".join(f'"{text}"' for text in texts)
-        return f"{'some' if plural else 'one'} of {names}" if len(texts) > 1 else names
+        return f"{'some' if plural else 'one'} of {quoted(texts)}" if len(texts) > 1 else quoted(texts)
     if origin is tuple:
         return f"list{plural} of {_noun(arguments[0], 's')}"
     if origin is dict:
