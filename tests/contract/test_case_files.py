@@ -187,8 +187,6 @@ def test_a_mesh_is_made_from_numbers_or_read_beside_the_case(tmp_path):
     (tmp_path / "inner").mkdir()
     write_mesh(make_mesh(phi_cells=3), tmp_path / "inner/mesh.vtu")
     assert case_in(tmp_path, SMALL + '[mesh]\nfile = "inner/mesh.vtu"\n').cylinder_mesh().phi_lines.size == 4
-    wide = f"{SMALL}vary.noise.treatment = ['exact']\nmesh.xi_max = 100.0"
-    assert case_in(tmp_path, wide).cylinder_mesh()  # bounded noise cuts it off
 
 
 MANY = '[vary]\n"noise.D0" = { start = 0.1, stop = 0.2, num = 11 }\n'
