@@ -25,7 +25,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, shortened
-from fpsolve.case.explain import explain, is_list, refuse
+from fpsolve.case.explain import MOST_FAULTS, explain, refuse
 from fpsolve.case.kinds import half_of, kinds_of, system_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
@@ -87,8 +87,6 @@ CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
 """What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
 """Of so many curves at most the response is computed unasked, and densities of it are written."""
-MOST_FAULTS = 1000
-"""Of so many faults of a case at most each is told."""
 USUAL_P = 2.0
 
 
@@ -412,7 +410,7 @@ class Case(Section):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
         named = table_of(data.get("output")).get("quantities")
-        is_of_p = not is_list(named) or MOMENT.name in named
+        is_of_p = not isinstance(named, list | tuple) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
 
     @model_validator(mode="after")
@@ -464,10 +462,9 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
-        if (count := error.error_count()) > MOST_FAULTS:
-            raise CaseError(
-                str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
-            ) from None
+        if error.error_count() > MOST_FAULTS:
+            text = f"has over {MOST_FAULTS} faults; start from a copy of a case, see `fpsolve new`"
+            raise CaseError(str(path), [Fault("", None, text)]) from None
         fields = dict[str, FieldInfo]()
         for name, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
             section = system_of(data) if name == "system" else name

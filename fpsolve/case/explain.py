@@ -13,6 +13,8 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from fpsolve.model.faults import MISSING, TableError, entry_of, fields_of, guess, nearest, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
+MOST_FAULTS = 1000
+"""Of so many faults of a case at most each is told."""
 _OWN = "own sentence"
 LIST, TABLE, WORD, NUMBER = "<list>", "<table>", "<word>", "<number>"
 """Tags of what TOML has there, in a union that is told apart by that; parts of pydantic's places that are no keys."""
@@ -55,7 +57,7 @@ def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
     try:
         return validated(fields, table)
     except ValidationError as error:
-        refuse(told(error.errors(), fields))
+        refuse(told(error.errors()[: MOST_FAULTS + 1], fields))
         raise
 
 
@@ -67,11 +69,6 @@ def told(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[Refusal]:
 def is_number(value: object) -> TypeGuard[float]:
     """Whether a value of TOML is a finite number."""
     return isinstance(value, int | float) and type(value) is not bool and abs(value) <= sys.float_info.max
-
-
-def is_list(value: object) -> TypeGuard[list[object] | tuple[object, ...]]:
-    """Whether a value is a list of TOML, or a tuple of Python."""
-    return isinstance(value, list | tuple)
 
 
 def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[Path, str, str]]:

@@ -100,8 +100,8 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
         return
     if figure.map and vary.crossing(figure.x) is None:
         text = (
-            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more; '
-            "vary two such keys, or remove it"
+            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more, '
+            "and x to be one of them; vary two such keys, or remove it"
         )
         yield ("map",), figure.map, text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):

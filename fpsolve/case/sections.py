@@ -61,15 +61,12 @@ QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
-_LARGEST = 1e30
 WANTED = (
     f"wanted relative error; if omitted {RTOL_OF_SEVERAL:g} under two noises that are not white, "
     f"{RTOL_BEYOND_PLANE:g} for more than two variables"
 )
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
-_MOST_LEVELS = 100
-"""Largest number of levels of excursions."""
 _MOST_ALONG = 1000
 """Largest number of places along an axis of the density of the response."""
 _MOST_PLACES = 4_000_000
@@ -309,7 +306,7 @@ class MomentAt(Section):
 
 def _increasing(ends: tuple[float, float]) -> tuple[float, float]:
     size = max(map(abs, ends))
-    if size > _LARGEST or not ends[1] - ends[0] > _APART * size:
+    if size > 1e30 or not ends[1] - ends[0] > _APART * size:
         raise ValueError(
             f"got {shown(ends)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, which "
             "differ in their first 9 digits; write, for example, [0.0, 4.0]"
@@ -367,9 +364,6 @@ class FigureSection(Section):
         if self.x != "p" and self.y == "moment":
             text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
             refuse([(("y",), self.y, text)])
-        if self.x == "p" and self.map:
-            text = "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"
-            refuse([(("map",), self.map, text)])
         if self.x != "p" and self.mark and "mark" in self.model_fields_set:
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
             refuse([(("mark",), self.mark, text)])
@@ -486,7 +480,7 @@ class ExcursionSection(Section):
             "levels = [2.0, 10.0, 100.0]",
             strict=False,
             min_length=1,
-            max_length=_MOST_LEVELS,
+            max_length=100,
         ),
     ] = (2.0, 10.0, 100.0)
     phi: Annotated[
