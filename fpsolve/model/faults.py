@@ -102,21 +102,18 @@ def _sentence(detail: ErrorDetails, fields: Mapping[str, FieldInfo]) -> str:
     return f"{name}: {sentence(detail, fields[str(name)])}"
 
 
-def sentence(detail: ErrorDetails, field: FieldInfo, must: str = "", example: str = "") -> str:
+def sentence(detail: ErrorDetails, field: FieldInfo) -> str:
     """What is wrong with a value: "got 0; must be a whole number >= 2 (how many); write, for example, num = 3".
 
     Args:
         detail: what pydantic says of it.
-        field: what it is.
-        must: what it must be; what the field accepts if none is given.
-        example: a line that states it; that of the field if none is given.
+        field: what it must be.
     """
-    kind, value, meaning = detail["type"], detail["input"], meaning_of(field)
+    kind, value, meaning, example = detail["type"], detail["input"], meaning_of(field), example_of(field)
     if kind == "too_long":
         noun = "entries" if any(type(each) is str for each in value) else "numbers"
         return f"lists {len(value)} {noun}; must be at most {detail['ctx']['max_length']}; list fewer"
-    must = f"must be {must or accepted(field)}" + (f" ({meaning})" if meaning else "")
-    example = example or example_of(field)
+    must = f"must be {accepted(field)}" + (f" ({meaning})" if meaning else "")
     if kind == "missing":
         return f"{MISSING}; {must}" + (f"; add it, for example {example}" if example else "")
     has_kind = kind.endswith(_TELL_KIND) or (kind == "literal_error" and type(value) is not str)

@@ -221,11 +221,8 @@ def test_fig3_frequency_lowers_and_noise_raises_the_largest_exponent():
 def test_almost_sure_stability_ends_where_the_paper_says(name, key):
     """Stable for r < 1 − π(S(2ω) + 4c1)/8ω and for c1 < −S(2ω)/4 + 2ω(1 − r)/π, by Eq. (39)."""
     case = load_case(CASES / f"{name}.toml")
-    curve = case.curve({})
-    oscillator, strength = (
-        curve.problem.system,
-        perturbation.reduced(curve.noise).spectral_density(2 * curve.problem.system.omega),
-    )
+    oscillator = case.system
+    strength = perturbation.reduced(case.noise).spectral_density(2 * oscillator.omega)
     end = {
         "fig5": 1 - math.pi * (strength + 4 * oscillator.c1) / (8 * oscillator.omega),
         "fig6": -strength / 4 + 2 * oscillator.omega * (1 - oscillator.restitution) / math.pi,

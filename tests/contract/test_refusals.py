@@ -143,10 +143,9 @@ def test_any_parameters_in_their_ranges_give_a_case_or_a_refusal(tmp_path, numbe
         stated = f"[{value!r}]" if key == "p" else repr(value)
         text, count = re.subn(rf"^{key} = .*", f"{key} = {stated}", text, flags=re.MULTILINE)
         assert count == 1
-    places = {"oscillator", "moments"}
     try:
         [curve] = case_in(tmp_path, text).curves()
         found = {"moments"} if curve.problem else set()
     except CaseError as error:
         found = {fault.key for fault in error.faults}
-    assert set() < found <= places
+    assert set() < found <= {"oscillator", "moments"}

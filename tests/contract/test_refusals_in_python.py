@@ -118,8 +118,8 @@ ROWS = "two rows of two finite numbers"
 
 
 def spelled(value):
-    """A value as messages write it, and what it is where that is wrong."""
-    return re.escape(repr(value).replace("'", '"').lower()) + r"( \((a string|a boolean)\))?"
+    """A value as messages write it."""
+    return re.escape(repr(value).replace("'", '"').lower())
 
 
 BAD = [
@@ -127,7 +127,7 @@ BAD = [
     *(
         (
             lambda each=each: noise(**dict([each])),
-            f"^NonGaussianNoise: {each[0]}: got {spelled(each[1])}; must be a finite number >= .*",
+            f"^NonGaussianNoise: {each[0]}: got {spelled(each[1])}.*; must be a finite number >= .*",
         )
         for each in (
             ("D0", 0.0),
@@ -177,7 +177,7 @@ BAD = [
     *(
         (
             lambda each=each: paper(**dict([each])),
-            f"^VibroImpactOscillator: {each[0]}: got {spelled(each[1])}; must be (a finite number|one of) .*",
+            f"^VibroImpactOscillator: {each[0]}: got {spelled(each[1])}.*; must be (a finite number|one of) .*",
         )
         for each in (
             ("omega", 0.0),
