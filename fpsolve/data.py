@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from html import escape
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 from fpsolve import __version__
 from fpsolve.drawing import canvas_of, draw, title_of, typeset
@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # each takes some tenths of a second to import
     import pandas
     import xarray
     from matplotlib.axes import Axes
+    from numpy.typing import ArrayLike
 
 LETTERS = 60
 """Those of a line above a picture."""
@@ -150,8 +151,8 @@ def brief(thing: object, text: str) -> str:
 def dataset(
     title: str,
     method: str,
-    numbers: Mapping[Quantity, Any],
-    coordinates: Mapping[Quantity, Any],
+    numbers: Mapping[Quantity, ArrayLike | None],
+    coordinates: Mapping[Quantity, ArrayLike],
     parameters: Parameters,
     **more: float | str | Sequence[str],
 ) -> xarray.Dataset:
@@ -208,7 +209,7 @@ class Result(ABC):
             return pandas.DataFrame({name: [whole[name].item()] for name in names})
         return whole[names].to_dataframe(dim_order=main.dims)
 
-    def plot(self, ax: Axes | None = None, **line_kwargs: Any) -> Axes:
+    def plot(self, ax: Axes | None = None, **line_kwargs: object) -> Axes:
         """Draw the main variable with its error, into `ax` or a new figure.
 
         Args:
@@ -226,7 +227,7 @@ class Result(ABC):
                 axes.set_title("\n".join(filter(None, lines)), parse_math=False)
         return axes
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         draw(found, axes, **kwargs)
 
     def __repr__(self) -> str:

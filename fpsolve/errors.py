@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from fpsolve.messages import Message, escaped, message_of
 from fpsolve.messages import Remedy as Remedy
@@ -62,7 +61,7 @@ class NotConverged(FpsolveError):
         partial: the best result that was reached, or None where there is none.
     """
 
-    def __init__(self, reason: str, partial: Any = None, remedy: str | None = None) -> None:
+    def __init__(self, reason: str, partial: object = None, remedy: str | None = None) -> None:
         super().__init__(reason, remedy)
         self.partial = partial
 
@@ -109,7 +108,7 @@ class CaseError(FpsolveError):
         more = len(self.faults) - len(lines)
         super().__init__("\n".join(map(escaped, [*lines, f"{file}: and {more} more"] if more else lines)))
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.file, self.faults)
 
     def _line(self, fault: Fault) -> str:

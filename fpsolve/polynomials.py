@@ -10,6 +10,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.linalg import eigh_tridiagonal
+from scipy.special import gammaln
 
 from fpsolve.arrays import FloatArray, finite
 
@@ -64,8 +65,6 @@ def logarithm(x: FloatArray, exponent: float, count: int) -> FloatArray:
     ∫ (1 − x²)^b C_2k dx of the Gegenbauer polynomials of λ = exponent + ½ is known for every b. Its derivative at b =
     exponent gives ∫ ln(1 − x²) C_2k, in the mean −λ/(k(k + λ)).
     """
-    from scipy.special import gammaln
-
     polynomials, k, c = gegenbauer(count, exponent), np.arange(1, (count + 1) // 2), exponent + 0.5
     at_one = np.exp(gammaln(2 * c + 2 * k) - gammaln(2 * c) - gammaln(2 * k + 1))
     lengths = at_one / polynomials.at(np.ones(1))[0][0, 2 * k]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import TableError, accepted, bounds_in, nearest, shown, strict_dataclass
 from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem, checked_problem
@@ -62,13 +64,14 @@ class Axis:
                 known = f"must be from start = {self.start} to stop = {self.stop}; remove it, or widen the frame"
                 raise TableError(f"got {value}; {known}", "at", i)
 
-    def value(self, share: Any) -> Any:
+    def value(self, share: ArrayLike) -> FloatArray:
         """The parameter at a share of the way from start to stop."""
         if self.scale == "log":
             value = self.start * (self.stop / self.start) ** np.asarray(share)
         else:
             value = self.start + (self.stop - self.start) * np.asarray(share)
-        return np.clip(value, self.start, self.stop)[()]
+        found: FloatArray = np.clip(value, self.start, self.stop)[()]
+        return found
 
     def share(self, value: float) -> float:
         """The inverse of `value`."""

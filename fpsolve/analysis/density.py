@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +48,7 @@ class GridDensity(Result):
         """The density over its coordinates, the weights for integrals, and of four variables the mean share."""
         dims = tuple(each.name for each in self.grid.quantities)
         density = Quantity("density", "ρ", "density", unit=self.grid.unit, dims=dims)
-        numbers = {density: self.values, **self.grid.means(self.values)}
+        numbers: dict[Quantity, ArrayLike] = {density: self.values, **self.grid.means(self.values)}
         return dataset(self.name, "finite elements", numbers, self.grid.coordinates, self.parameters)
 
     def mean(self, f: Callable[[FloatArray, FloatArray], ArrayLike]) -> float:
@@ -94,7 +94,7 @@ class Density(GridDensity):
         """∫ρ dφ at `xi`, shape (n,)."""
         return self.phi_weights @ self.values
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         if self.grid.unit == "1/rad":  # a density of the phase at each state of the noise
             for k, xi in enumerate(self.xi):
                 draw_line(axes, found.density[:, k], None, **{"label": rf"$\xi$ = {xi:g}", **kwargs})
@@ -128,7 +128,7 @@ class DirectionDensity(GridDensity):
     def to_xarray(self) -> xarray.Dataset:
         return super().to_xarray().assign_attrs(total_variation_error=self.error)
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         self.grid.draw(axes, self.values, found.density.attrs, **{"vmin": 0.0, **kwargs})
 
     def _said(self) -> str:
@@ -173,7 +173,9 @@ def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted
     """One of the `densities`, if it is one. Raises `NotConverged`."""
     found, problem, name = densities(pair), pair.generator.problem, f"{kind} density"
     values = found.fields.tilted_density if kind == "tilted" else found.fields.T_adjoint
-    density = OF_GRIDS[type(found.grid)](found.grid, values, f"{name} at p = {pair.p:g}", problem.values, found.error)
+    density = OF_GRIDS[type(found.grid)](
+        found.grid, values, f"{name} at p = {pair.p:g}", dict(problem.values), found.error
+    )
     if (share := density.negative_share()) > MOST_NEGATIVE:
         raise NotConverged(Message(Code.NEGATIVE_DENSITY, name=name, p=pair.p, size=share), density, Remedy.CELLS)
     return density

@@ -26,7 +26,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +44,7 @@ from fpsolve.exponent.root import nonzero_root
 from fpsolve.exponent.solver import ExponentSolver, solver_of
 from fpsolve.fem.axis import along
 from fpsolve.fem.element import middles
+from fpsolve.fem.noise_axes import LineAxis, StateAxis
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.plane import Harmonics
 from fpsolve.model.problem import Problem
@@ -140,7 +141,7 @@ class Excursion(Result):
         about, notes = ("probability of excursions", "finite elements"), self.notes
         return dataset(*about, numbers, {LEVEL: levels}, self.parameters, notes=notes, phi=self.phi, xi=self.xi)
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         """Both bounds over A, and what lies between them."""
         levels = np.geomspace(1.01, 100.0, 101)
         low, high = self.bounds(levels)
@@ -199,7 +200,7 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise) -> 
         solver = replace(solver, mesh=None)
     check_start(problem, phi, xi)
     exponent = solver.lyapunov_exponent()
-    found = Excursion(exponent, phi=phi, xi=xi, parameters=problem.values)
+    found = Excursion(exponent, phi=phi, xi=xi, parameters=dict(problem.values))
     if abs(exponent.value) <= exponent.error_estimate:
         return replace(
             found, notes=(Message(Code.EXCURSION_OPEN, value=exponent.value, error=exponent.error_estimate),)
@@ -231,7 +232,7 @@ def solve_excursion(solver: ExponentSolver, *, phi: Start, xi: StartOfNoise) -> 
     return replace(found, notes=tuple(notes))
 
 
-def check_start(problem: Problem, phi: Any, xi: Any) -> None:
+def check_start(problem: Problem, phi: object, xi: object) -> None:
     """Refuse a start that a problem does not have. Raises `ValueError`."""
     if not (isinstance(phi, str) and phi == UNIFORM):
         real_number(phi, "phi")
@@ -306,7 +307,7 @@ def _at_start(pair: PrincipalPair, phi: Start, xi: StartOfNoise) -> float:
     return float(means @ pair.right)
 
 
-def _mean_functions(axis: Any, xi: StartOfNoise) -> FloatArray:
+def _mean_functions(axis: LineAxis | StateAxis, xi: StartOfNoise) -> FloatArray:
     """The means of the functions of a noise over its start, shape (size,)."""
     if xi == STATIONARY:
         at = axis.samples()

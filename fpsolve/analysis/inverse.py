@@ -19,13 +19,14 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq, minimize
 
 from fpsolve.analysis.axis import Axis, bounds_of, check_ends, check_key
 from fpsolve.analysis.scan import TOLERANCE, Sample
+from fpsolve.analysis.spreads import cube
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
 from fpsolve.arrays import FloatArray, real_number
 from fpsolve.data import Result, dataset, written
@@ -255,7 +256,7 @@ def _unreached(tried: _Tried, target: Target, axes: Sequence[Axis], is_crossed: 
     nearest = min(samples, key=lambda each: abs(each.value))
     place = ", ".join(f"{axis.key} = {written(float(value))}" for axis, value in zip(axes, nearest.at, strict=True))
     frame = ", ".join(f"{axis.key} from {axis.start:g} to {axis.stop:g}" for axis in axes)
-    about: dict[str, Any] = {"target": target.equation, "frame": frame, "place": place}
+    about: dict[str, object] = {"target": target.equation, "frame": frame, "place": place}
     if target.kind == "stability_index":
         about["side"] = target.side(nearest.value)
     else:
@@ -268,13 +269,11 @@ def _nearest(
     tried: _Tried, target: Target, axes: Sequence[Axis], here: FloatArray, units: FloatArray
 ) -> Sample | Absent:
     """The point F = 0 that is nearest to the problem."""
-    from scipy.stats import qmc  # not before it is needed, as it takes a while
-
     start = np.clip(here, *np.array([(axis.start, axis.stop) for axis in axes]).T)
     if (found := _nearest_from(tried, start, axes, here, units)) is not None:
         return found
-    corners, inner = product((0.0, 1.0), repeat=len(axes)), qmc.LatinHypercube(len(axes), seed=0)
-    for each in (*corners, *inner.random(POINTS * len(axes)).tolist()):
+    corners, inner = product((0.0, 1.0), repeat=len(axes)), cube(len(axes), POINTS * len(axes), seed=0)
+    for each in (*corners, *inner.tolist()):
         tried(np.array([axis.value(u) for axis, u in zip(axes, each, strict=True)]))
     if (best := min(tried.samples, key=lambda each: abs(each.value), default=None)) is None:
         return _unreached(tried, target, axes, False)

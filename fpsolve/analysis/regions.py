@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.target import Target
@@ -54,8 +55,6 @@ class Regions:
 
 def regions(lines: Sequence[Boundary]) -> Regions:
     """The regions of lines that were all sought in the frame, on a grid `FINE` times as fine as the coarsest scan."""
-    from scipy.ndimage import distance_transform_edt
-
     scans = [line.scan for line in lines]
     points = FINE * min(scan.nodes.size - 1 for scan in scans)
     values = np.stack([scan.on((np.arange(points) + 0.5) / points) for scan in scans])

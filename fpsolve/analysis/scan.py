@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice, pairwise
 from time import thread_time
-from typing import Any, NamedTuple
+from typing import Literal, NamedTuple, cast
 
 import numpy as np
+from contourpy import contour_generator
+from scipy.interpolate import BPoly
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
@@ -89,13 +91,12 @@ class Scan:
 
         The mixed derivatives at the nodes are differences of the gradients; 0 beside missing ones.
         """
-        from scipy.interpolate import BPoly  # not before it is needed, as it takes a while
 
-        def along(values: FloatArray, slopes: FloatArray) -> Any:
-            return BPoly.from_derivatives(self.nodes, np.stack([values, slopes], axis=1))(points)
+        def along(values: FloatArray, slopes: FloatArray) -> FloatArray:
+            return np.asarray(BPoly.from_derivatives(self.nodes, np.stack([values, slopes], axis=1))(points))
 
         by_u, by_v = np.moveaxis(self.gradients, 2, 0)
-        order: Any = min(2, self.nodes.size - 1)
+        order: Literal[1, 2] = 2 if self.nodes.size > 2 else 1
         twists = (np.gradient(each, self.nodes, axis=k, edge_order=order) for k, each in enumerate((by_v, by_u)))
         mixed = np.nan_to_num(0.5 * sum(twists))
         return along(along(self.values, by_u).T, along(by_v, mixed).T).T
@@ -105,11 +106,9 @@ class Scan:
 
         Where nodes are missing they are also those on the edges between two nodes.
         """
-        from contourpy import contour_generator  # not before it is needed, as it takes a while
-
         finer = np.linspace(0, 1, FINE * (self.nodes.size - 1) + 1)
         values = np.ma.masked_invalid(self.on(finer))
-        lines: Any = contour_generator(finer, finer, values.T, line_type="Separate").lines(0.0)
+        lines = cast("list[FloatArray]", contour_generator(finer, finer, values.T, line_type="Separate").lines(0.0))
         for start, end in chain.from_iterable(map(pairwise, lines)):
             if (along := end - start).any():
                 yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)

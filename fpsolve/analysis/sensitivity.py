@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,7 +109,7 @@ class Sensitivities(Result):
         first = {LYAPUNOV_EXPONENT.latex: (0.0, exponent)} if exponent else {}
         return first | {moment_at(rows[i][0]).latex: rows[i] for i in chosen}
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         bars = {
             label: np.array([self.theta[key] * each.value for key, each in slopes.items()])
             for label, (_, slopes) in self.shown().items()
@@ -196,10 +196,11 @@ def solve_sensitivities(
         return {}
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
-    solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
+    solves: dict[str, Callable[[], Mapping[str, Estimate]]]
+    solves = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     values = problem.values
-    noises: list[Any] = [*problem.sections.items()][1:]
+    noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
     keys = [f"{section}.{name}" for section, noise in noises for name in noise.one_sided]
     one_sided = [Message(Code.ONE_SIDED, key=key, value=values[key]) for key in keys if key in along]
     return Sensitivities(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -101,7 +101,7 @@ def _crossing(fields: tuple[Field, Field], at: FloatArray) -> tuple[Sample, Samp
     return None
 
 
-def _or_none(search: Callable[..., Found | None], *arguments: Any) -> Found | None:
+def _or_none(search: Callable[..., Found | None], *arguments: object) -> Found | None:
     """What a search finds; None where F does not exist on its way."""
     try:
         return search(*arguments)

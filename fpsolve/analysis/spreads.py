@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import repeat
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,7 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P
 
 if TYPE_CHECKING:
     import xarray
+    from scipy.stats._distn_infrastructure import rv_continuous_frozen
 
 LEVEL = 0.95
 """The probability that an interval holds."""
@@ -42,9 +43,18 @@ UNCERTAIN = (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
 """The quantities besides Λ(p) of which intervals are given."""
 MOST_SAMPLES = 100_000
 """Largest number of samples."""
+Stated = float | Mapping[str, float]
+"""How uncertain a parameter is: 0.05, a share of its value, or {"sd": 0.02}."""
 
 
-def deviation_of(stated: Any, value: float) -> float:
+def cube(sides: int, count: int, seed: int) -> FloatArray:
+    """A Latin hypercube of points in the unit cube, shape (count, sides)."""
+    from scipy.stats import qmc  # 280 ms, of which most commands have no need
+
+    return np.asarray(qmc.LatinHypercube(sides, seed=seed).random(count))
+
+
+def deviation_of(stated: Stated, value: float) -> float:
     """The standard deviation of a parameter with a value, before its law is cut. Raises `ValueError`.
 
     Args:
@@ -52,7 +62,7 @@ def deviation_of(stated: Any, value: float) -> float:
         value: of the parameter.
     """
     is_number = isinstance(stated, Mapping) and stated.keys() == {"sd"}
-    size = stated["sd"] if is_number else stated
+    size = stated["sd"] if isinstance(stated, Mapping) and is_number else stated
     if isinstance(size, bool) or not isinstance(size, int | float) or not 0 < size < math.inf:
         raise ValueError(
             f"got {shown(stated)}; must be a share of the value, such as 0.05, or a standard deviation such as "
@@ -77,9 +87,9 @@ class Law:
     high: float = math.inf
 
     @property
-    def _cut(self) -> Any:
+    def _cut(self) -> rv_continuous_frozen:
         """The law that is cut."""
-        from scipy.stats import truncnorm  # not before it is needed, as it takes a while
+        from scipy.stats import truncnorm  # as above
 
         return truncnorm((self.low - self.value) / self.sd, (self.high - self.value) / self.sd, self.value, self.sd)
 
@@ -128,7 +138,7 @@ class Spread:
         return float(ndtr(-self.mean / self.deviation))
 
 
-def laws_of(problem: Problem, uncertain: Mapping[str, Any]) -> dict[str, Law]:
+def laws_of(problem: Problem, uncertain: Mapping[str, Stated]) -> dict[str, Law]:
     """The laws of some parameters by their keys.
 
     Args:
@@ -169,9 +179,7 @@ def latin_hypercube(laws: Mapping[str, Law], count: int, seed: int = 0) -> dict[
     """
     if not is_whole(count, 2, MOST_SAMPLES):
         raise ValueError(f"got count = {shown(count)}; must be a whole number from 2 to {MOST_SAMPLES}")
-    from scipy.stats import qmc  # not before it is needed, as it takes a while
-
-    shares = qmc.LatinHypercube(len(laws), seed=seed).random(count)
+    shares = cube(len(laws), count, seed)
     return {key: law.quantile(shares[:, i]) for i, (key, law) in enumerate(laws.items())}
 
 
@@ -214,7 +222,7 @@ class Uncertainty(Result):
 
 def uncertainty(
     problem: Problem,
-    uncertain: Mapping[str, Any],
+    uncertain: Mapping[str, Stated],
     p: ArrayLike = (),
     *,
     rtol: float | None = None,

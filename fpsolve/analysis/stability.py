@@ -11,7 +11,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -245,7 +245,7 @@ class Boundary(Result):
         found.x.attrs["key"], found.y.attrs["key"] = self.x.key, self.y.key
         return found
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         style = {"linewidth": 2, "label": self.target.latex, **in_full(kwargs)}
         for path in [branch.path for branch in self.branches] or [(np.zeros(0), np.zeros(0))]:
             [line] = axes.plot(*path, **style)
@@ -358,7 +358,7 @@ def untraced(
     *,
     step: float | None,
     nodes: int | None,
-    **more: Any,
+    budget: Budget,
 ) -> Boundary:
     """A line of which nothing is traced, with the usual step and nodes where they are None. Raises `ValueError`."""
     dear = choose(problem).is_dear(target.order)
@@ -367,7 +367,7 @@ def untraced(
         raise ValueError(f"got step = {step:g}; must be above {SHORTEST:g} and up to {LARGEST:g} sides of the frame")
     count = nodes or (DEAR_NODES if dear else NODES)
     scan = Scan(np.linspace(0, 1, count), np.zeros((0, 0)), np.zeros((0, 0, 2)))
-    return Boundary(target, x, y, problem, scan, step=float(step), **more)
+    return Boundary(target, x, y, problem, scan, step=float(step), budget=budget)
 
 
 def is_of_line(reason: Message) -> bool:

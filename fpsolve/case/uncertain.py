@@ -9,7 +9,7 @@ from typing import cast
 from pydantic import ValidationInfo
 from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.spreads import Law, deviation_of, laws_of
+from fpsolve.analysis.spreads import Law, Stated, deviation_of, laws_of
 from fpsolve.case.explain import DEPENDENT, checked, refuse
 from fpsolve.case.kinds import problem_of
 from fpsolve.case.sections import UNCERTAIN, Deviation, StandardDeviation, flat
@@ -28,7 +28,7 @@ class Uncertain:
         deviations: the standard deviations of the parameters, by their keys.
     """
 
-    deviations: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
+    deviations: Mapping[str, Stated] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Whether anything is uncertain."""
@@ -51,7 +51,7 @@ def uncertain_of(value: object, info: ValidationInfo) -> Uncertain:
         refuse([((), value, DEPENDENT)])
         return Uncertain()
     known, vary = dict.fromkeys(problem.differentiable, _FIELD), info.data.get("vary", Vary())
-    found = dict[str, float | Mapping[str, float]]()
+    found = dict[str, Stated]()
     for key, each in checked(known, flat(value, problem.parameters)).items():
         found[key] = each.model_dump() if isinstance(each, StandardDeviation) else each
     refuse(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.exponent.eigen import PairDerivatives
@@ -80,8 +79,9 @@ class Changed:
         return pair.generator.changed(self._by, pair.p, rate, derivative=k)
 
 
-def _summed(parts: Sequence[Any], norm: float) -> Estimate:
+def _summed(parts: ArrayLike, norm: float) -> Estimate:
     """The sum of some parts over a norm, with about what rounding may change in it."""
+    parts = np.asarray(parts)
     size = float(np.sum(np.abs(parts))) / norm
     return Estimate(float(np.sum(parts)) / norm, 1e3 * _EPS * size, size)
 

@@ -16,7 +16,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import scipy.linalg
@@ -30,6 +30,7 @@ from fpsolve.exponent.method import RTOL_BEYOND_PLANE, SMALL_P, Stage, Tolerance
 from fpsolve.exponent.moments import even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.starts import SHARE, Start
+from fpsolve.fem.axis import FunctionAxis
 from fpsolve.fem.directions import DirectionAxis, SphereAxis, group_dimensions
 from fpsolve.fem.factors import factorised
 from fpsolve.fem.generator import Generator
@@ -152,7 +153,7 @@ class DirectionStart(Start):
         rounding = 2 * self.problem.dimension * sys.float_info.epsilon * abs(p) * framed(self.problem).unit_rate
         return replace(pair, rounding=pair.rounding + rounding)  # an entry of S⁻¹AS is a sum of products twice
 
-    def lacking(self, pair: PrincipalPair, k: int, finer: Any) -> float:
+    def lacking(self, pair: PrincipalPair, k: int, finer: FunctionAxis) -> float:
         """What is left without them, by the sizes of these changes, as their sum may be small by chance."""
         if finer.size == self.space.axes[k].size:  # there are no more
             return math.inf
@@ -261,7 +262,9 @@ class Directions(Elements):
     remedy = Remedy.MANY
     preferred_even = Elements.even
 
-    def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
+    def places(
+        self, p: float, tolerance: Tolerance, found: Sequence[Solution]
+    ) -> Iterator[tuple[Stage, PrincipalPair | None]]:
         """One: the coarsest functions, or some of the nearest p; where that is p itself, finer ones than before."""
         if known := self.spaces.get(p):
             yield known.start.refined(known, tolerance(p, known.value), 0), known.pair

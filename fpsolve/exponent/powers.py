@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.linalg import expm as dense_exponential
 from scipy.linalg import matrix_balance
 from scipy.sparse.linalg import expm
+from scipy.special import gammaln
 
 from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.exponent.rightmost import EXACTLY, Rates, Solve
@@ -49,8 +50,6 @@ def symmetric_power(matrix: FloatArray, p: int) -> Any:
 
 def multinomials(alphas: IntArray) -> FloatArray:
     """p!/α!."""
-    from scipy.special import gammaln
-
     return np.exp(gammaln(alphas.sum(axis=1) + 1) - gammaln(alphas + 1).sum(axis=1))
 
 

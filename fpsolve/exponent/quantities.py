@@ -28,7 +28,7 @@ import math
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from fpsolve.arrays import is_whole, shown
 from fpsolve.exponent.eigen import PrincipalPair
@@ -209,14 +209,14 @@ class Index(Quantity):
 def _index(
     quantity: Quantity,
     solve: Callable[[ExponentSolver], Estimate | Absent],
-    **more: Any,
+    interval: tuple[float, float] = (-math.inf, math.inf),
 ) -> Index:
     """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
 
     def theory(problem: Problem) -> float:
         return float(getattr(second_order_or_none(problem), quantity.name, math.nan))
 
-    return Index(**vars(quantity), solve=solve, theory=theory, **more)
+    return Index(**vars(quantity), solve=solve, theory=theory, interval=interval)
 
 
 def _restitution_by_theory(problem: Problem) -> float:

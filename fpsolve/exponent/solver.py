@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
+from types import UnionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,7 +51,7 @@ FEW_MOMENTS = 16
 SLOPE_SHARE = 1e-3
 """Of what a tangent rises, by which it may lie too high, as slopes have errors."""
 
-_KINDS: Sequence[tuple[str, Any, str]] = (
+_KINDS: Sequence[tuple[str, type | UnionType, str]] = (
     ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
     ("budget", Budget, "a Budget"),
     ("rtol", Real, "a number such as 1e-8"),

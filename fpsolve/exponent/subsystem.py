@@ -10,10 +10,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cdf2rdf
 
 from fpsolve.arrays import ROUNDED, FloatArray
@@ -67,10 +66,10 @@ class Subsystem(System):
         basis = np.array(self.basis)
         return np.linalg.inv(basis), basis
 
-    def inside(self, matrix: Any) -> FloatArray:
+    def inside(self, matrix: ArrayLike) -> FloatArray:
         """A matrix in the coordinates of all blocks, without what is rounding."""
         rows, columns = self._sides
-        found = rows @ matrix @ columns
+        found = rows @ np.asarray(matrix) @ columns
         return np.where(np.abs(found) > self.rounded * np.linalg.norm(found), found, 0.0)
 
     def part(self, terms: Sequence[CoefficientMatrix]) -> tuple[CoefficientMatrix, ...]:
@@ -184,13 +183,13 @@ def couplings(blocks: Sequence[Subsystem], matrices: Iterable[FloatArray]) -> ND
     return found
 
 
-def reached(pattern: NDArray[Any]) -> NDArray[np.bool_]:
+def reached(pattern: FloatArray | NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which variable, the row, feels which, the column, through any number of others; every one feels itself."""
     count = len(pattern)
     return np.linalg.matrix_power((pattern != 0) | np.eye(count, dtype=bool), count)
 
 
-def components(pattern: NDArray[Any]) -> list[tuple[int, ...]]:
+def components(pattern: FloatArray | NDArray[np.bool_]) -> list[tuple[int, ...]]:
     """The variables in groups that feel each other, of which each feels earlier ones alone."""
     feels = reached(pattern)
     groups = {tuple(np.flatnonzero(row & feels[:, k]).tolist()) for k, row in enumerate(feels)}

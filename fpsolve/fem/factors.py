@@ -8,12 +8,11 @@ from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
 from itertools import pairwise
 from threading import RLock
-from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csc_matrix, identity, kron
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 from threadpoolctl import ThreadpoolController
 
 from fpsolve.arrays import FloatArray, IntArray, dense
@@ -68,7 +67,7 @@ def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
         return SparseFactors(operator)
 
 
-def sparse_lu(matrix: Any, *, permc_spec: str = "MMD_AT_PLUS_A", **options: Any) -> Any:
+def sparse_lu(matrix: csc_matrix, *, permc_spec: str = "MMD_AT_PLUS_A", **options: object) -> SuperLU:
     """SuperLU's factors, ordered for a symmetric pattern if nothing else is named. Raises `SingularMatrix`."""
     try:
         return splu(matrix, permc_spec=permc_spec, **options)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from fpsolve.arrays import Matrix, one
 from fpsolve.fem.axis import KroneckerSum
@@ -70,7 +69,7 @@ class Generator:
         self._maker: Terms = chosen.phi.terms(self.framed, chosen.phi, self.space(0.0).noises)
         self.terms, self.keeps_constants = self._maker.all(), self._maker.keeps_constants
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """What it is made of; the matrices are assembled again when they are needed."""
         return type(self), (self.problem, self.chosen)
 

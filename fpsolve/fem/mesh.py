@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from fpsolve.arrays import FloatArray, IntArray, is_whole, real_number, shown
 from fpsolve.errors import MeshError
 from fpsolve.files import atomic
 from fpsolve.messages import Code, Message, Remedy
+
+if TYPE_CHECKING:
+    import meshio
 
 MAX_DEGREE = 20
 """Highest degree of the polynomials in a cell."""
@@ -209,7 +212,7 @@ def _check_format(path: Path) -> None:
         raise MeshError(f'{path} has the ending "{path.suffix}"; it must be one of {", ".join(FORMATS)}')
 
 
-def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> Any:
+def _as_meshio(mesh: CylinderMesh, impact: float, gmsh: bool) -> meshio.Mesh:
     """The mesh with its marked lines, as meshio holds it."""
     import meshio
 
@@ -259,7 +262,7 @@ def _check_tensor_grid(quads: IntArray, m: int, n: int) -> None:
         )
 
 
-def _degree(content: Any, name: str) -> int:
+def _degree(content: meshio.Mesh, name: str) -> int:
     values = content.point_data.get(name)
     if values is None:
         return int(getattr(make_mesh(), name))

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 MOST_SECONDS = 60
 MOST_BYTES = 2**30
@@ -23,7 +22,7 @@ class MatError(ValueError):
     """What is wrong with a file."""
 
 
-def read_mat(path: Path, most: int) -> dict[str, Any]:
+def read_mat(path: Path, most: int) -> dict[str, object]:
     """The arrays of real numbers at the top level of a file, by their names; others are left out.
 
     Args:

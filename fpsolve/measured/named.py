@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -126,7 +125,7 @@ def parameters_of(text: str) -> dict[str, float]:
     return found
 
 
-def named_density(name: str, omega: Any, **parameters: float) -> FloatArray:
+def named_density(name: str, omega: object, **parameters: float) -> FloatArray:
     """S(ω) = ∫ C(t) cos ωt dt of a family, in the square of its unit times s: πG(ω), see `NAMED`.
 
     Args:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
@@ -118,10 +119,11 @@ class Problem:
 
     @cached_property
     def values(self) -> Mapping[str, float | str]:
-        """The values of all parameters, numbers and words, by their keys."""
-        return {
-            f"{section}.{name}": value for section, half in self.sections.items() for name, value in half.values.items()
-        }
+        """The values of all parameters, numbers and words, by their keys; `at` gives a problem with others."""
+        halves = self.sections.items()
+        return MappingProxyType(
+            {f"{section}.{name}": value for section, half in halves for name, value in half.values.items()}
+        )
 
     @cached_property
     def form(self) -> str:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +36,8 @@ from fpsolve.nonlinear.rest import NearRest
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+
+    from fpsolve.fem.noise_axes import LineAxis
 
 AT_ONE_PHASE = 2.0
 """By what the error estimate of the flux at the impacts is larger: it converges like n^(−3/2) or slower in φ."""
@@ -139,7 +141,7 @@ class StationaryResponse(Result, NearRest):
         """
         a, phi, xi = (np.atleast_1d(np.asarray(each, dtype=float)) for each in (a, phi, xi))
         plane = self.solution.plane
-        axis: Any = plane.axis
+        axis = cast("LineAxis", plane.axis)
         samples = axis.at(xi / axis.unit)
         noise = samples.values * (samples.weight / samples.factor)[:, None]
         u = np.log(a)[:, None] - plane.flow.gauge(phi)
@@ -168,7 +170,7 @@ class StationaryResponse(Result, NearRest):
         a = (np.arange(points) + 0.5) * self.reach / points
         both = (np.arange(2 * points) + 0.5 - points) * self.reach / points
         x, v = (a if self.flow.is_positive(k) else both for k in (0, 1))
-        numbers: dict[Quantity, Any] = {
+        numbers: dict[Quantity, ArrayLike] = {
             about.density: self.joint_density(x[:, None], aspect * v),
             about.amplitude_density: self.amplitude_density(a),
         }
@@ -184,7 +186,7 @@ class StationaryResponse(Result, NearRest):
     def _table(self) -> xarray.Dataset:
         return self.to_xarray()[["amplitude_density"]]
 
-    def plot_amplitude(self, ax: Axes | None = None, **line_kwargs: Any) -> Axes:
+    def plot_amplitude(self, ax: Axes | None = None, **line_kwargs: object) -> Axes:
         """Draw the density of the amplitude into `ax` or a new figure."""
         found = self.to_xarray(points=400)
         style = {"marker": "", "label": found.attrs["method"], **line_kwargs}
@@ -196,11 +198,13 @@ class StationaryResponse(Result, NearRest):
                 axes.set_title(found.attrs["title"], parse_math=False)
         return axes
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        from matplotlib.colors import LogNorm
-
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         most = float(found.density.max())
-        draw_plane(axes, found.density.where(found.density > 0), **{"norm": LogNorm(most * 1e-4, most), **kwargs})
+        draw_plane(
+            axes,
+            found.density.where(found.density > 0),
+            **({"norm": "log", "vmin": most * 1e-4, "vmax": most} | kwargs),
+        )
 
     def _said(self) -> str:
         return f"mean amplitude {self.means['amplitude']}, {self.unknowns} unknowns"

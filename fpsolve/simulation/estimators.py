@@ -21,15 +21,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import logsumexp
 
 from fpsolve.arrays import FloatArray, real_number
-from fpsolve.data import Result, dataset
+from fpsolve.data import Quantity, Result, dataset
 from fpsolve.drawing import draw_dots, finish, label_axes
 from fpsolve.errors import NotConverged
 from fpsolve.messages import Code, Message, message_of
@@ -128,7 +129,7 @@ class MonteCarlo(Result):
         each = [(each.p, each.value, each.standard_error, each.effective_paths) for each in self.estimates]
         p, value, error, effective = np.array(each, dtype=float).reshape(-1, 4).T
         kind = "standard error"
-        numbers = {
+        numbers: dict[Quantity, ArrayLike] = {
             MOMENT: value,
             MOMENT.error(kind): error,
             EFFECTIVE_PATHS: effective,
@@ -141,13 +142,13 @@ class MonteCarlo(Result):
         for name, (of, of_error) in self.wall.items():
             numbers |= {OF_STOPS[name]: of, OF_STOPS[name].error(kind): of_error}
         estimator = ", ".join(dict.fromkeys(each.estimator for each in self.estimates))
-        more: dict[str, Any] = {
+        more: dict[str, float | str | Sequence[str]] = {
             "paths": self.paths, "time": self.time, "step": self.step, "seed": self.seed, "estimator": estimator,
             "interrupted": int(self.interrupted), "warnings": self.warnings,
         }  # fmt: skip
         return dataset(MOMENT.words, "Monte Carlo", numbers, {P: p}, self.parameters, **more)
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         style = {"label": f"{found.attrs['method']} ± 2 standard errors", **kwargs}
         if found.moment.notnull().any():
             draw_dots(axes, found.p.values, found.moment.values, found.moment_error.values, **style)
@@ -198,10 +199,10 @@ def simulate(
         NotConverged: the numbers overflowed.
         KeyboardInterrupt: before two transients were done.
     """
-    how: dict[str, Any] = {"paths": paths, "time": time, "step": step, "seed": seed, "progress": progress}
+    run = partial(_simulated, problem, paths=paths, time=time, step=step, seed=seed, progress=progress)
     if estimator is not None:
-        return _simulated(problem, p, estimator, PROGRESS_STEPS, **how)
-    found = _simulated(problem, p, "direct", PROGRESS_STEPS // 2, **how)
+        return run(p, estimator, PROGRESS_STEPS)
+    found = run(p, "direct", PROGRESS_STEPS // 2)
     few = [each.p for each in found.estimates if each.value is None]
     if found.interrupted:
         return found
@@ -211,7 +212,7 @@ def simulate(
         return found
     few = [few[i] for i in dict.fromkeys(np.linspace(0, len(few) - 1, MOST_POPULATIONS).round().astype(int).tolist())]
     try:
-        more = _simulated(problem, few, "population", PROGRESS_STEPS // 2, **how)
+        more = run(few, "population", PROGRESS_STEPS // 2)
     except KeyboardInterrupt:
         return replace(found, interrupted=True)
     known = {each.p: each for each in more.estimates}
@@ -319,7 +320,7 @@ def _simulated(
         impacts=int(sum(batch.tally[0] for batch in plain)),
         warnings=(*_missing(estimates), *found[0][1], *stopped),
         interrupted=interrupted,
-        parameters=problem.values,
+        parameters=dict(problem.values),
         wall=dict(zip(OF_STOPS if isinstance(known.wall, Floor) else (), of_wall, strict=False)),
     )
 

@@ -27,7 +27,7 @@ Both are changed in place.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba.extending import overload
@@ -91,7 +91,7 @@ class Driven(NamedTuple):
 
     matrices: FloatArray
     wall: Rays | Floor
-    step: Any
+    step: object
     rows: int | slice
 
     @staticmethod
@@ -119,7 +119,7 @@ class Switched(NamedTuple):
     arrivals: FloatArray
     sizes: FloatArray
     wall: Rays | Floor
-    step: Any
+    step: object
     rows: int | slice
 
     @staticmethod
@@ -178,7 +178,7 @@ def _flow_by_wall(wall, m, k, t, h, state, tally, other, start):
 class InTurn(NamedTuple):
     """The motions by all noises, as a tuple, of `size` variables now, and the row of each past value below them."""
 
-    motions: Any
+    motions: object
     size: int
     rows: FloatArray
 

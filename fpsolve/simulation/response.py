@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray
 from fpsolve.data import Quantity, Result, dataset
@@ -83,7 +84,7 @@ class Response(Result):
     def to_xarray(self) -> xarray.Dataset:
         """The densities over the middles of their cells, and the means."""
         kind, about = "standard error", self.about
-        numbers: dict[Quantity, Any] = {
+        numbers: dict[Quantity, ArrayLike] = {
             about.density: self.density,
             about.amplitude_density: self.amplitude_density,
             about.amplitude_density.error(kind): self.amplitude_error,
@@ -107,7 +108,7 @@ class Response(Result):
         """The density of the amplitude: beside that of (x, v) it would be repeated for every cell."""
         return self.to_xarray()[["amplitude_density", "amplitude_density_error"]]
 
-    def plot_amplitude(self, ax: Axes | None = None, **line_kwargs: Any) -> Axes:
+    def plot_amplitude(self, ax: Axes | None = None, **line_kwargs: object) -> Axes:
         """Draw the density of the amplitude in a band of two standard errors, into `ax` or a new figure."""
         found = self.to_xarray()
         style = {"marker": "", "label": f"{found.attrs['method']}\n± 2 standard errors", **line_kwargs}
@@ -119,12 +120,10 @@ class Response(Result):
                 axes.set_title(found.attrs["title"], parse_math=False)
         return axes
 
-    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
-        from matplotlib.colors import LogNorm
-
+    def _draw(self, found: xarray.Dataset, axes: Axes, **kwargs: object) -> None:
         most = self.density.max()
-        scale = LogNorm(max(self.density[self.density > 0].min(), most * 1e-4), most)
-        draw_plane(axes, found.density.where(found.density > 0), **{"norm": scale, **kwargs})
+        ends = {"vmin": max(self.density[self.density > 0].min(), most * 1e-4), "vmax": most}
+        draw_plane(axes, found.density.where(found.density > 0), **({"norm": "log", **ends} | kwargs))
         scale = self.reach / self.amplitude_edges[-1]
         axes.set(xlim=scale * self.x_edges[[0, -1]], ylim=scale * self.v_edges[[0, -1]])
 
@@ -222,7 +221,7 @@ def simulated_response(
         impact_rate=impacts if system.jumps else None,
         time=duration,
         interrupted=interrupted,
-        parameters=problem.values,
+        parameters=dict(problem.values),
         about=system.response,
     )
 

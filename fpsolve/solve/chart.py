@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -122,8 +122,8 @@ def dear_lines(case: Case) -> Message | None:
 def begun_lines(case: Case) -> list[Boundary]:
     """The lines of a chart, of which nothing is traced."""
     frame, problem = charted(case), case.problem
-    own: dict[str, Any] = {"step": frame.step, "nodes": frame.nodes, "budget": case.budget}
-    return [untraced(target, frame.x, frame.y, problem, **own) for target in frame.lines]
+    begun = partial(untraced, step=frame.step, nodes=frame.nodes, budget=case.budget)
+    return [begun(target, frame.x, frame.y, problem) for target in frame.lines]
 
 
 def solve_chart(

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import squared_frequency
 from fpsolve.model.problem import Problem
+
+if TYPE_CHECKING:
+    from fpsolve.model.noises.filter import Filter
 
 SAMPLES = 601
 """Number of values of a noise on each side, and of amplitudes of its swings."""
@@ -28,7 +31,7 @@ ZOOM = 41
 """Number of points between two that are farther apart."""
 
 
-def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, Any]:
+def eigenvalues_at(problem: Problem, xi: ArrayLike) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Growth rates of ln ‖x‖ at ξ, that of the faster mode first, and whether the phase turns.
 
     Where A(ξ) has real eigenvalues they are the rates; where the phase turns, their common real part and the jumps,
@@ -68,7 +71,7 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     The rate is p⟨G⟩ − a²/4S(ω), the mean over a turn of ωt; where S is larger than at 0 it may exceed that of
     `steady_places`.
     """
-    noise: Any = problem.valued
+    noise = cast("Filter", problem.valued)
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
     a = 4 * abs(p) * _noise_strength(problem) * spectrum * np.linspace(0, 1, SAMPLES)

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -53,10 +52,11 @@ class Scale:
     linear: float
     quadratic: float
 
-    def moment(self, p: ArrayLike) -> Any:
+    def moment(self, p: ArrayLike) -> FloatArray:
         """The scale of Λ(p); that of λ is `linear`, that of Λ″(0) 2 `quadratic`."""
         size = np.abs(np.asarray(p, dtype=float))
-        return (size * (self.linear + self.quadratic * size))[()]
+        found: FloatArray = (size * (self.linear + self.quadratic * size))[()]
+        return found
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,11 @@ class SecondOrder:
     impact_rate: float
     log_factor: float
 
-    def moment_exponent(self, p: ArrayLike) -> Any:
+    def moment_exponent(self, p: ArrayLike) -> FloatArray:
         """ε²Λ₂(p), Eq. (37); an array for an array of p."""
         p = np.asarray(p, dtype=float)
-        return (p * (self.quadratic * p + self.lyapunov_exponent) + 0.0)[()]  # 0 without a sign
+        found: FloatArray = (p * (self.quadratic * p + self.lyapunov_exponent) + 0.0)[()]  # 0 without a sign
+        return found
 
     @property
     def lyapunov_exponent(self) -> float:
@@ -126,7 +127,7 @@ def second_order(problem: Problem) -> SecondOrder:
 
 def harmonic_loads(problem: Problem) -> Sequence[str]:
     """The noises of which only the start is random, as sentences have them."""
-    noises: list[Any] = [*problem.sections.items()][1:]
+    noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
     loads = [(section, noise) for section, noise in noises if not noise.is_random]
     return [f"{section} with sigma = 0" if noise.values else "cos(nu*t)" for section, noise in loads]
 
@@ -299,9 +300,9 @@ def scale_of(problem: Problem) -> Scale:
     return replace(found, linear=found.linear or found.quadratic or own.unit_rate)  # λ may be 0 exactly
 
 
-def _growth(matrix: Any, frame: FloatArray) -> Harmonics:
+def _growth(matrix: ArrayLike, frame: FloatArray) -> Harmonics:
     """q of a matrix in the coordinates in which the order 0 rotates."""
-    return stretching(np.linalg.inv(frame) @ matrix @ frame)
+    return stretching(np.linalg.inv(frame) @ np.asarray(matrix) @ frame)
 
 
 def _rotating_frame(a: FloatArray) -> tuple[FloatArray, float]:
