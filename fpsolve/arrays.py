@@ -29,6 +29,21 @@ ROUNDED = 1e-12
 """Share of the largest terms of a sum below which the sum is 0 but for rounding."""
 
 
+def read_only(array: FloatArray) -> FloatArray:
+    """The array itself, into which nobody can write any more."""
+    array.setflags(write=False)
+    return array
+
+
+class ReadOnly:
+    """A dataclass whose arrays nobody can write into."""
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                read_only(value)
+
+
 @dataclass(frozen=True)
 class Constant:
     """The coefficient c."""

@@ -61,7 +61,7 @@ COSTLY = (
     "fpsolve.solve.sensitivities.solve_sensitivities",
     "fpsolve.solve.excursions.solve_excursion",
     "fpsolve.solve.response.solve_response",
-    "fpsolve.solve.directions.densities",
+    "fpsolve.solve.eigenfunctions.densities",
 )
 """What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}

@@ -178,7 +178,7 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
             raise ValueError(f"got {key} twice; remove one of them")
         axis = each if isinstance(each, Axis) else start_and_stop(problem, key)
         if axis is None:
-            raise ValueError(f'{key} is 0, which leaves its range open; state it, as in Axis("{key}", -1.0, 1.0)')
+            raise ValueError(f"{key} is 0, which leaves its range open; state both of its ends")
         check_ends(problem, axis)
         found.append(axis)
     return tuple(found)

@@ -16,9 +16,9 @@ from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable
 from fpsolve.messages import Code, Message
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
+from fpsolve.results.csv_json import TABLES
 from fpsolve.results.folders import SIMULATED, SOLVED, own_folder
 from fpsolve.results.simulate import SIMULATION
-from fpsolve.results.tables import TABLES
 from fpsolve.signals import signals_held
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import refuse_mesh
@@ -55,7 +55,8 @@ def run(
     """Solve a case, write `out`/<name of the case>/, and return the results, one for each curve.
 
     Sets that an earlier run finished there, also one that was killed, are not solved again. Each run rewrites all
-    files, and removes what a simulation of other parameters wrote. summary.json says whether all curves are there.
+    files, and removes what a simulation of other parameters wrote. `complete` in results.nc says whether all
+    curves are there.
 
     >>> run("minimal.toml")  # a case of `fpsolve new minimal`
     (CurveResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
@@ -130,7 +131,7 @@ def run_case(
                     sweep.notes,
                     notes(case, simulated, MONTE_CARLO),
                 )
-                files = *TABLES, *SIMULATION * bool(simulated)
+                files = *(name for name in TABLES if (folder / name).exists()), *SIMULATION * bool(simulated)
                 is_whole &= sweep.done == case.planned
                 write_report(case, folder, watch, blocks, started=sweep.started, files=files, complete=is_whole)
 
@@ -158,7 +159,7 @@ def _solve(case: Case, folder: Path, pool: Pool, watch: Watch, *, is_fresh: bool
             with watch.bar(sweep.phase) as progress:
                 sweep.solve(pool, progress)
         except (KeyboardInterrupt, WorkersDied):
-            sweep.results.add_rest()
+            sweep.results.read(is_all=True)
             sweep.write_all()
             raise
         with watch.bar(Phase(case.name, "tables")), signals_held():

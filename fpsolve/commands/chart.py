@@ -17,6 +17,7 @@ from fpsolve.solve.chart import (
     LINE_RECORDS,
     Chart,
     begun_lines,
+    closed_forms_of,
     dear_lines,
     key_of_line,
     recalled,
@@ -78,7 +79,8 @@ def chart_case(
         keys = {key_of_line(case, line): line for line in lines}
         lines = [recalled(records, *each) for each in keys.items()]
         with shown_at_the_end(draw):
-            for chart in solve_chart(case, lines, scans_of(keys, records, pool), progress=progress, stepped=stepped):
+            rows, closed = scans_of(keys, records, pool), closed_forms_of(lines)
+            for chart in solve_chart(lines, rows, closed, progress=progress, stepped=stepped):
                 write_chart(case, chart, folder)
     return chart
 

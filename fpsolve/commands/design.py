@@ -14,9 +14,9 @@ from fpsolve.case.case import Case
 from fpsolve.commands.interrupts import ANEW, saying_if_interrupted
 from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_FILES, Cases, Writing
 from fpsolve.files import writable
+from fpsolve.results.csv_json import facts_of
 from fpsolve.results.design import write_design
 from fpsolve.results.folders import DESIGNED, own_folder
-from fpsolve.results.tables import facts_of
 from fpsolve.solve.design import DesignOutcome, solve_design, wanted_of
 from fpsolve.tell.blocks import Note
 from fpsolve.tell.design import found_of, show

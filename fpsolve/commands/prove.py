@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from operator import call
 from pathlib import Path
 from time import monotonic
 from typing import Annotated, Any
@@ -24,7 +25,6 @@ from fpsolve.solve.prove import (
     PROVEN_RECORDS,
     Answer,
     CurveProof,
-    answer,
     asked_of,
     check_proof,
     gathered,
@@ -82,7 +82,7 @@ def prove_case(
             Records(folder / PROVEN_RECORDS),
             dict[str, Any](kind=PROVEN_BOUNDS, key=key_of_bounds, keeps=is_kept),
         )
-        for _, found, is_known in answered(records, pool, answer, questions(case, width), **how):
+        for _, found, is_known in answered(records, pool, call, questions(case, width), **how):
             answers.append(found)
             progress(failed=not found.is_proven, known=is_known)
     return proofs

@@ -40,7 +40,7 @@ def run(
         table: Print every number of up to ten curves, also Λ(p) at more than 12 p.
     """
     from fpsolve.commands.cases import run_case
-    from fpsolve.results.tables import whole_summary
+    from fpsolve.results.csv_json import summary_line
     from fpsolve.solve.question import refuse_mesh
     from fpsolve.solve.simulate import refuse_obstacles
     from fpsolve.tell.notes import left_out
@@ -63,7 +63,7 @@ def run(
         if not (options.quiet or interruption):
             print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
-            print(whole_summary(case, sweep.results, sweep.facts))
+            print(summary_line(sweep.results, sweep.facts))
         else:
             what = done_of(case, len(sweep.results), sweep.failed)
             options.print_written(case, what, sweep.facts["wall_seconds"], known_of(case, sweep.known))

@@ -18,12 +18,11 @@ from fpsolve.errors import WorkersDied
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.results.columns import COUNTS
-from fpsolve.results.eigenfunctions import write_curves
-from fpsolve.results.files import FILES
+from fpsolve.results.csv_json import GROWING, TABLES, Writer, facts_of
+from fpsolve.results.eigenfunctions import FILES, write_curves
 from fpsolve.results.known import Results, record_of
 from fpsolve.results.response import write_response
-from fpsolve.results.tables import GROWING, TABLES, Writer, facts_of
+from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import Status
 from fpsolve.solve.question import Job
 from fpsolve.solve.questions import BY_NAME
@@ -163,7 +162,7 @@ class Sweep:
         """Write tables of all sets, the first one last."""
         started, self.facts = monotonic(), facts_of(self.case, self.started)
         for name, write in reversed(tables.items()):
-            write(self.case, self.results, self.folder / name, self.facts)
+            write(self.results, self.folder / name, self.facts)
         self._due = monotonic() + REST * (monotonic() - started)
 
     def write_all(self) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_array, real_numbers
+from fpsolve.arrays import FloatArray, read_only, real_array, real_numbers
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.curve import Values, values
@@ -82,7 +82,7 @@ class MomentLyapunovFunction(Result):
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
         self._curves = self.solver.curves(low, high, MOST_PARTS)
-        self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
+        self.nodes = read_only(np.unique([p for curve in self._curves for p in curve.nodes]))
         at = self._values(self.nodes)
         if obstacle := broken_convexity(self.nodes, at.value, at.derivative, at.error, lambda: at.derivative_error):
             raise NotConverged(obstacle, remedy=self.solver.method.refinement)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
+from fpsolve.arrays import FloatArray, read_only, real_number, real_numbers, shown
 from fpsolve.budget import Meter, OverBudget, begin, unless_over_budget
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
@@ -89,6 +89,7 @@ class MomentLyapunov(Result):
     def __post_init__(self) -> None:
         least = 0.5 * np.spacing(np.abs(self.value))
         object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
+        super().__post_init__()
 
     @cached_property
     def warnings(self) -> tuple[Message, ...]:
@@ -114,7 +115,7 @@ class MomentLyapunov(Result):
     def derivative(self) -> FloatArray:
         """Λ′(p), shape (n,): `slope`, and what is solved now where that is NaN; NaN where there is none."""
         known = zip(self.p.tolist(), self.slope.tolist(), strict=True)
-        return np.array([self.solver.slope(p) if p and math.isnan(slope) else slope for p, slope in known])
+        return read_only(np.array([self.solver.slope(p) if p and math.isnan(slope) else slope for p, slope in known]))
 
     @property
     def derivative_error(self) -> FloatArray:

@@ -12,7 +12,7 @@ from pathlib import Path
 from fpsolve.case.case import Case
 from fpsolve.errors import OutputError, Remedy
 from fpsolve.files import TEMPORARY, alone, writable, write_text
-from fpsolve.results.tables import TABLES
+from fpsolve.results.csv_json import TABLES
 from fpsolve.solve.questions import QUESTIONS
 
 SOLVED = "|".join([*map(re.escape, TABLES), r"figure\.(png|pdf)", *(each.names for each in QUESTIONS if each.names)])

@@ -38,7 +38,7 @@ from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
-from fpsolve.results.tables import facts_of
+from fpsolve.results.csv_json import facts_of
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import Job, Numerics, fault
 from fpsolve.solve.sets import everything, result_of, solve_curve
@@ -72,7 +72,7 @@ MOST_EQUATIONS = 6
 """Lines of the equations of motion that the page shows; more would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
-NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
+NUMBERS = {MOMENT.name, *INDICES, "classes", "discretisation"}
 """The parts that are solved."""
 Answer = Mapping[str, Any]
 """What JSON can hold."""

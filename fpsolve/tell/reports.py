@@ -12,7 +12,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
 from fpsolve.model.equation import equations_of
-from fpsolve.results.tables import facts_of
+from fpsolve.results.csv_json import facts_of
 from fpsolve.tell import problem
 from fpsolve.tell.blocks import Block
 from fpsolve.tell.html import page_of

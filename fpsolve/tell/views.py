@@ -87,7 +87,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
             yield found
 
     chart, begun = Chart((), ()), begun_lines(case)
-    for chart in solve_chart(case, begun, scans(), has_closed_forms=False):
+    for chart in solve_chart(begun, scans()):
         tell(answer(chart))
     grid.clear()
     return answer(chart)

@@ -128,7 +128,7 @@ def test_of_many_curves_the_extreme_and_the_first_failed_ones_have_a_row(tmp_pat
         failures.replace("(", "", 1),
     )
     assert re.fullmatch(
-        r"warning: case: 22 of 60 curves: rtol = 1e-08 is not met by λ: .*; most for .* = \S+ \(all in summary.json\)",
+        r"warning: case: 22 of 60 curves: rtol = 1e-08 is not met by λ: .*; most for .* = \S+ \(all in curves.csv\)",
         warnings,
     )
 
@@ -157,7 +157,7 @@ def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
     few = notes(run(tmp_path, *asked, case=TEXT).err)
     assert few.count("note: ") == 1
     assert few.startswith(f"note: case, noise.D0 = 0.5 and noise.D0 = 1: {weak}: do not rely on it from |p| = 2 on")
-    assert few.endswith("; most for noise.D0 = 1 (all in summary.json)\n")
+    assert few.endswith("; most for noise.D0 = 1 (all in curves.csv)\n")
     many = run(tmp_path, *asked, "--set", "vary.noise.D0={start=0.3, stop=1.0, num=12}").err
     assert weak not in many  # a table of many curves has no column of it
     assert "perturbation theory, Eq. (37)" not in run(tmp_path, "check", *asked[1:]).err
