@@ -31,7 +31,7 @@ from fpsolve.results.response import write_response
 from fpsolve.results.simulate import SIMULATION
 from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import CurveResult, Status
-from fpsolve.solve.question import Job
+from fpsolve.solve.question import Job, refuse_mesh
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records
 from fpsolve.solve.sets import solve_set
@@ -325,5 +325,6 @@ def refuse_no_numbers(case: Case, *, monte_carlo: bool) -> None:
     """Refuse a case that can only be simulated, or cannot be where that is asked for. Raises `FpsolveError`."""
     if not case.method.is_computed and (refused := case.method.reason(0.0, "Λ(p)")):
         raise FpsolveError(f"{case.path}: {refused}")
+    refuse_mesh(case)
     if monte_carlo:
         refuse_obstacles(case)

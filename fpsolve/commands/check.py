@@ -24,7 +24,7 @@ from fpsolve.solve.check import (
 )
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.moments import QUESTION as MOMENTS
-from fpsolve.solve.question import Job, Numerics
+from fpsolve.solve.question import Job, Numerics, refuse_mesh
 from fpsolve.tell.check import agreement, show
 from fpsolve.tell.notes import notes
 from fpsolve.tell.progress import SETS, SILENT, Phase, Watch
@@ -85,5 +85,9 @@ def check(
         is_met = all(comparison.met for comparison in outcome.comparisons)
         return Done(code=NOT_CONVERGED if outcome.failures else 0 if is_met else CHECK_FAILED)
 
-    refuse = refuse_no_hierarchy if hierarchy else lambda _: None
+    def refuse(case: Case) -> None:
+        refuse_mesh(case)
+        if hierarchy:
+            refuse_no_hierarchy(case)
+
     return on_cases(cases, options, work, refuse=refuse, workers=workers)

@@ -9,12 +9,12 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-from fpsolve.case.explain import nearest, shown
 from fpsolve.case.matrices import KEYS
 from fpsolve.case.schema import SCHEMA, schema_text
 from fpsolve.errors import FpsolveError
 from fpsolve.files import write_text
 from fpsolve.messages import escaped
+from fpsolve.model.faults import nearest, shown
 
 
 @cache

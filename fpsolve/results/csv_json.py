@@ -138,7 +138,7 @@ def _beyond(case: Case, result: CurveResult) -> Content:
         found[CLASSES.name] = [_class(each) for each in classes]
     if EXCURSIONS in case.asked:
         found[EXCURSIONS] = result.excursion and _excursion(case, result.excursion)
-    if case.has_response:
+    if RESPONSE in case.asked:
         found[RESPONSE] = result.response and _response(result.response)
     if SENSITIVITIES in case.asked:
         found[SENSITIVITIES] = result.sensitivities and _sensitivities(result.sensitivities)

@@ -7,20 +7,25 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from contourpy import contour_generator
 
+from fpsolve.analysis.axis import check_axes
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions, regions
 from fpsolve.analysis.scan import Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import ChartSection
-from fpsolve.errors import FpsolveError, NoPerturbationTheory
+from fpsolve.case.vary import assignments
+from fpsolve.errors import NoPerturbationTheory
 from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message, message_of
+from fpsolve.model.faults import TableError
 from fpsolve.pool import Pool
 from fpsolve.solve.records import Records, answered, key_of, made, plain
 from fpsolve.theory.perturbation import second_order
@@ -75,22 +80,35 @@ class Chart:
 
 
 def charted(case: Case) -> ChartSection:
-    """The frame of a case and the lines in it. Raises `FpsolveError` where it has none."""
+    """The frame of a case and the lines in it. Raises `CaseError` where it has none."""
     if case.chart is not None:
         return case.chart
-    raise FpsolveError(
-        f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
-        'stop = 5.0 }, y like it, and lines = ["moment(2) = 0"]'
+    raise case.refusal(
+        'missing; add [chart] with x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }, y like it, and '
+        'lines = ["moment(2) = 0"]',
+        "chart",
     )
 
 
 def refuse_no_chart(case: Case) -> None:
-    """Refuse a case without a chart, or that varies another key than its two. Raises `FpsolveError`."""
-    frame = charted(case)
+    """Refuse a case without a chart, or whose axes span no frame, or that varies another key than these two.
+
+    Raises:
+        CaseError: it is such a case.
+    """
+    frame, problem = charted(case), case.problem
+    try:
+        check_axes(problem, frame.x, frame.y)
+    except TableError as failure:
+        raise case.refusal(failure.text, "chart", *failure.path) from None
     if set(case.vary.keys) - {frame.x.key, frame.y.key}:
-        raise FpsolveError(
-            f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
-        )
+        text = "a chart has one set of the other parameters; remove [vary], or write --set vary={}"
+        raise case.refusal(text, "vary")
+    p = np.array([target.order for target in frame.lines])
+    for x, y in product((frame.x.start, frame.x.stop), (frame.y.start, frame.y.stop)):
+        corner = {frame.x.key: x, frame.y.key: y}
+        if reason := obstacle(problem, corner, p):
+            raise case.refusal(f"with {assignments(corner)}: {reason}; choose another frame", "chart")
 
 
 def dear_lines(case: Case) -> Message | None:

@@ -18,11 +18,13 @@ import numpy as np
 from fpsolve.budget import Meter
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, MeshError
+from fpsolve.exponent.elements import GivenMesh
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.signals import is_interrupt
@@ -73,6 +75,28 @@ class Numerics:
     def solver(self, problem: Problem) -> ExponentSolver:
         """What solves Λ(p) of a problem."""
         return ExponentSolver(problem, self.mesh, rtol=self.rtol, budget=self.budget)
+
+
+def refuse_mesh(case: Case) -> None:
+    """Refuse a mesh that cannot be read or made, has too many unknowns, or does not serve the first parameter set.
+
+    Raises:
+        CaseError: it does not.
+    """
+    stated = case.mesh.model_dump(exclude_none=True)
+    try:
+        with np.errstate(all="ignore"):
+            method = Numerics.of(case).solver(next(case.curves()).problem).method if stated else None
+            if isinstance(method, GivenMesh):
+                space, most = method.generators[0].chosen, case.budget.most(method.generators[0].chosen)
+                if space.size > most:
+                    raise MeshError(
+                        f"makes {space.size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+                        "lower degrees, or a larger [budget]"
+                    )
+    except (MeshError, OSError, ValueError) as failure:
+        place, value = (("mesh", "file"), case.mesh.file) if case.mesh.file else (("mesh",), stated)
+        raise case.refusal(f"got {shown(value)}; {failure}", *place) from None
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,7 @@ def _values_of(noise: Noise, count: int) -> FloatArray:
 
 def _settings(case: Case, number: int) -> Settings | None:
     """The tolerance of the response, which is its own, and the grid of its density if there are few curves."""
-    if not case.has_response:
+    if RESPONSE not in case.asked:
         return None
     grid = case.response.grid
     places = [grid.amplitude, grid.phi, grid.xi] if case.planned <= MOST_GRIDS else None
@@ -85,7 +85,7 @@ def _solve(job: Job, settings: Settings) -> CurveResponse:
 
 
 def _numbers(case: Case, result: CurveResult | None) -> Numbers:
-    about = case.problem.linear.response.numbers if case.has_response else {}
+    about = case.problem.linear.response.numbers if RESPONSE in case.asked else {}
     found = result.response.numbers if result and result.response else {}
     return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from fpsolve.analysis.target import said
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
+from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
@@ -40,15 +44,18 @@ def refuse_obstacles(case: Case) -> None:
         FpsolveError: with the curve and the reason.
     """
     processors()
+    stated = case.monte_carlo
     for curve in case.curves():
-        place = f"with {curve.label}: " if curve.varied else ""
+        place = case.vary.line_of(curve.number) + (f"with {curve.label}: " if curve.varied else "")
         try:
             parts = simulated_parts(curve.problem)
         except (FpsolveError, ValueError) as failure:
-            raise FpsolveError(f"{case.path}: {place}{said(failure)}") from None
-        found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
-        for name, sentence in found.items():
-            raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
+            raise case.refusal(f"{place}{said(failure)}", "monte_carlo") from None
+        for name, sentence in obstacles(*parts, time=stated.time, step=stated.step).items():
+            raise case.refusal(f"{place}{sentence}", "monte_carlo", name)
+        orders = np.array(stated.p or ())
+        if reason := obstacle(curve.base, curve.varied, orders, with_moments=choose(curve.problem).has_pairs):
+            raise case.refusal(f"{place}{reason}", "monte_carlo", "p")
 
 
 def simulate_curve(

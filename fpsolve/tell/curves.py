@@ -15,7 +15,7 @@ import numpy as np
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.sections import EXCURSIONS
+from fpsolve.case.sections import EXCURSIONS, RESPONSE
 from fpsolve.data import short_names, written
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, Index
@@ -141,7 +141,7 @@ def _quantities(case: Case, table: Table) -> Iterator[Shown]:
             Column(f"P(sup ‖x‖ ≥ {level:g})", 1),
             lambda result: bounds_text(result.excursion, level) if result.excursion else "",
         )
-    if case.has_response:
+    if RESPONSE in case.asked:
         means = case.problem.linear.response.means
         for name in {"amplitude_squared"} & means.keys() or means:
             yield Shown(Column(means[name].symbol, 1), partial(_mean, name))

@@ -216,7 +216,9 @@ class Explorer:
             problem = self.first.at(values)
         except ValidationError as failure:
             ranges = {key.rpartition(".")[2]: each.field or UNBOUNDED for key, each in self.first.parameters.items()}
-            raise FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure, ranges))) from failure
+            raise FpsolveError(
+                "\n".join(f"{key}: {text}" for _, key, text in explain(failure.errors(), ranges))
+            ) from failure
         except (TypeError, ValueError) as failure:
             raise FpsolveError(str(failure)) from failure
         if sentence := obstacle(self.first, values, self.case.p):

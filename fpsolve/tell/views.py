@@ -56,7 +56,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
         sides = frame.x, frame.y
         check_axes(case.problem, *sides)
     except ValidationError as failure:
-        told = [f"{key}: {text}" for _, key, text in explain(failure, ChartSection.model_fields)]
+        told = [f"{key}: {text}" for _, key, text in explain(failure.errors(), ChartSection.model_fields)]
         raise FpsolveError("\n".join(told)) from failure
     except ValueError as failure:
         raise FpsolveError(said(failure)) from failure
