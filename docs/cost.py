@@ -68,7 +68,7 @@ def over_accuracy() -> Iterator[Curve]:
 
 def over_epsilon() -> Iterator[Curve]:
     """One moment, from weak to strong noise."""
-    oscillator = CASES["weak"].oscillator
+    oscillator = CASES["weak"].system
     cases = [_one(replace(oscillator, epsilon=float(epsilon)), CASES["weak"].noise) for epsilon in EPSILONS]
     yield Curve("", list(EPSILONS), cases)
 
@@ -77,7 +77,7 @@ def over_tau() -> Iterator[Curve]:
     """One moment, from fast to slow noise."""
     for name in ("weak", "strong"):
         noises = [NonGaussianNoise(D0=1.0, tau0=float(tau), r0=0.95).ou_reduction() for tau in TAUS]
-        yield Curve(f"{name} noise", list(TAUS), [_one(CASES[name].oscillator, noise) for noise in noises])
+        yield Curve(f"{name} noise", list(TAUS), [_one(CASES[name].system, noise) for noise in noises])
 
 
 def _one(oscillator: Any, noise: Any) -> Case:
@@ -104,11 +104,11 @@ def times(case: Case) -> dict[str, float]:
 
 
 def _problem(case: Case) -> Problem:
-    return Problem(case.oscillator, case.noise)
+    return Problem(case.system, case.noise)
 
 
 def _allowed(case: Case, p: float, value: float) -> float:
-    return case.rtol * max(abs(value), float(moment_scale(case.oscillator, case.noise, p)))
+    return case.rtol * max(abs(value), float(moment_scale(case.system, case.noise, p)))
 
 
 def _reference(case: Case) -> FloatArray | None:

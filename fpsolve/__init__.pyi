@@ -31,7 +31,7 @@ from .model.systems.plane_system import PlaneSystem as PlaneSystem
 from .model.systems.vibro_impact import VibroImpactOscillator as VibroImpactOscillator
 from .nonlinear.response import stationary_response as stationary_response
 from .proofs.questions import prove as prove
-from .results.datasets import open_results as open_results
+from .results.netcdf import open_results as open_results
 from .simulation.estimators import simulate as simulate
 from .tell.explore import explore as explore
 

@@ -29,6 +29,21 @@ ROUNDED = 1e-12
 """Share of the largest terms of a sum below which the sum is 0 but for rounding."""
 
 
+def read_only(array: FloatArray) -> FloatArray:
+    """The array itself, into which nobody can write any more."""
+    array.setflags(write=False)
+    return array
+
+
+class ReadOnly:
+    """A dataclass whose arrays nobody can write into."""
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                read_only(value)
+
+
 @dataclass(frozen=True)
 class Constant:
     """The coefficient c."""
@@ -70,6 +85,12 @@ def is_log_spaced(values: Iterable[Any]) -> bool:
 def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
     """Whether a value is a whole number from one to another; True and False are none."""
     return isinstance(value, int | np.integer) and type(value) is not bool and bool(least <= value <= most)
+
+
+def require(value: object, kinds: Any, name: str, must: str) -> None:
+    """Refuse an argument of another type, or True and False. Raises `TypeError`, one sentence with its name."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise TypeError(f"got {name} = {shown(value)}; must be {must}")
 
 
 def real_number(value: Any, name: str) -> float:

@@ -12,14 +12,13 @@ from io import TextIOWrapper
 from pathlib import Path
 
 from cyclopts import App, CycloptsError, CycloptsPanel, Group, Parameter
+from rich.console import Console
 
 from fpsolve import __version__
-from fpsolve.arrays import shown
-from fpsolve.commands.errors import drop_blocked_output, print_error
-from fpsolve.commands.options import BAD_INPUT, NOT_CONVERGED
+from fpsolve.commands.errors import BAD_INPUT, NOT_CONVERGED, drop_blocked_output, print_error
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.messages import escaped, short
-from fpsolve.signals import INTERRUPTED, ended_by_signals
+from fpsolve.signals import INTERRUPTED, TERMINATED, is_interrupt, sigterm_interrupts
 
 _TEXTS = {path.stem: path.read_text(encoding="utf-8") for path in Path(__file__).parent.glob("commands/*.py")}
 COMMANDS = {name: text.split('"""')[1] for name, text in sorted(_TEXTS.items()) if f"\ndef {name}(" in text}
@@ -39,7 +38,8 @@ app = App(
     Example: fpsolve run cases/fig1.toml
 
     Exit codes: 0 success, 1 a checked value differs or a design is out of
-    reach, 2 bad input, 3 not converged or nothing found, 130 interrupted
+    reach, 2 bad input, 3 not converged or nothing found, 130 interrupted,
+    143 terminated
 
     Commands:
       """
@@ -61,30 +61,27 @@ for _name in COMMANDS:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command, and return its exit code, see the help of `app`.
-
-    SIGHUP and SIGTERM interrupt it too; the exit code is then 128 and the number of the signal.
-    """
+    """Run a command, and return its exit code, see the help of `app`; SIGTERM interrupts it, too."""
     if argv is None and not sys.warnoptions:  # fpsolve tells what NumPy and matplotlib warn of
         warnings.simplefilter("ignore")
         os.environ["PYTHONWARNINGS"] = "ignore"  # of workers
         logging.disable(logging.WARNING)
-    with ended_by_signals() as received:
-        code = _run(argv)
-    return 128 + received[0] if received else code
+    with sigterm_interrupts() as received:
+        code = _run(sys.argv[1:] if argv is None else argv)
+    return TERMINATED if received else code
 
 
-def _run(argv: Sequence[str] | None) -> int:
+def _run(given: Sequence[str]) -> int:
     for stream in (sys.stdout, sys.stderr):  # an output whose encoding has no Greek shows a question mark
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
-    given = sys.argv[1:] if argv is None else argv
     try:
-        try:
-            Path.cwd()
-        except OSError:
-            raise FpsolveError("the working folder does not exist any more; change to another folder") from None
-        code = _called([each for each in given if each != TRACEBACK])
+        code: int | None = app(
+            [each for each in given if each != TRACEBACK],
+            result_action="return_value",
+            exit_on_error=False,
+            error_console=Console(stderr=True),
+        )
         if sys.stdout is not None:  # as it is where the output is closed
             sys.stdout.flush()
     except CycloptsError:  # cyclopts has said what is wrong
@@ -94,9 +91,6 @@ def _run(argv: Sequence[str] | None) -> int:
             traceback.print_exc()
         print_error(failure.message)
         return NOT_CONVERGED if isinstance(failure, NotConverged | WorkersDied) else BAD_INPUT
-    except KeyboardInterrupt as interrupt:
-        print_error(str(interrupt) or "interrupted")
-        return INTERRUPTED
     except (BrokenPipeError, SystemExit):  # the reader of the output has gone, as with `| head -1`; rich exits then
         drop_blocked_output()
         return CLOSED_PIPE
@@ -105,18 +99,12 @@ def _run(argv: Sequence[str] | None) -> int:
         place, reason = failure.filename or "the output", failure.strerror or failure
         print_error(f"{place} cannot be written: {reason}; send it to another place")
         return BAD_INPUT
+    except BaseException as failure:
+        if not is_interrupt(failure):
+            raise
+        print_error(str(failure) if isinstance(failure, KeyboardInterrupt) and failure.args else "interrupted")
+        return INTERRUPTED
     return code or 0
-
-
-def _called(arguments: Sequence[str]) -> int | None:
-    """The exit code of the command that is named; without one all are listed."""
-    if split := [each for each in arguments if "\n" in each and "=" not in each]:  # values may have line ends
-        raise FpsolveError(f"got {shown(split[0])}; a file's name may have no line ends here; rename the file")
-    from rich.console import Console
-
-    errors = Console(stderr=True)
-    code: int | None = app(arguments, result_action="return_value", exit_on_error=False, error_console=errors)
-    return code
 
 
 if __name__ == "__main__":

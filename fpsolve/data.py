@@ -11,6 +11,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Self
 
 from fpsolve import __version__
+from fpsolve.arrays import ReadOnly
 from fpsolve.drawing import canvas_of, draw, title_of, typeset
 from fpsolve.errors import FpsolveError
 
@@ -180,7 +181,7 @@ def dataset(
     return xarray.Dataset(variables, places, about)
 
 
-class Result(ABC):
+class Result(ReadOnly, ABC):
     """Something that was computed, as data and as a picture; a mixin of frozen dataclasses with `repr=False`."""
 
     @abstractmethod

@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import errno
 import json
-import os
 import stat
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
-from secrets import token_hex
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from fpsolve.errors import OutputError
 from fpsolve.messages import Code, Message, Remedy
@@ -23,33 +23,47 @@ LOCK_SECONDS = 0.1
 """Seconds for which a run tries to lock a folder: another run may just have removed the file of its lock."""
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP)
 """Numbers of the errors of file systems that have no locks."""
-TEMPORARY = r"\.fpsolve-[a-z0-9_]{8}(\.\w+)?"
-"""The pattern of the names of unfinished files, which a killed run leaves."""
 LARGEST = 2**29
 """Largest size of a file that is read as a whole, in bytes."""
+_announce: ContextVar[Callable[[Path], object]] = ContextVar("announce", default=lambda _: None)
 
 
 @contextmanager
 def atomic(path: Path) -> Iterator[Path]:
-    """A temporary file beside `path`, with the same ending, that takes its place when the body succeeds.
+    """The `draft_of` a file, which takes its place when the body succeeds, and is removed when it fails.
 
-    Missing folders are made. When the body fails the temporary file is removed. Who may read the file follows from the
-    umask, as for any new file.
+    Missing folders are made. Who may read the file follows from the umask, as for any new file.
 
     Raises:
         OSError: the folder cannot be made, or the file cannot be written; it names `path`.
     """
-    temporary = path.with_name(f".fpsolve-{token_hex(4)}{path.suffix}")
+    draft = draft_of(path)
     try:
+        _announce.get()(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.touch(exist_ok=False)
         try:
-            yield temporary
-            temporary.replace(path)
+            draft.touch()
+            yield draft
+            draft.replace(path)
         finally:
-            temporary.unlink(missing_ok=True)
+            draft.unlink(missing_ok=True)
     except OSError as failure:
         raise OSError(failure.errno, failure.strerror or str(failure), str(path)) from failure
+
+
+def draft_of(path: Path) -> Path:
+    """The unfinished file beside `path`, with the same ending, which a killed run leaves."""
+    return path.with_name(f".fpsolve-{path.name}")
+
+
+@contextmanager
+def announced(take: Callable[[Path], object]) -> Iterator[None]:
+    """In the body `take` is called with the path of each file that will be written, before the file is there."""
+    token = _announce.set(take)
+    try:
+        yield
+    finally:
+        _announce.reset(token)
 
 
 @contextmanager
@@ -63,8 +77,6 @@ def writable(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
         raise OutputError(f"{folder} cannot be made: {failure.strerror or failure}", Remedy.FOLDER) from failure
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise OutputError(f"{folder} cannot be written to", Remedy.FOLDER)
     try:
         yield
     except OSError as failure:
@@ -83,7 +95,7 @@ def alone(folder: Path) -> Iterator[None]:
     Raises:
         OutputError: the folder cannot be made or written to, or another run has it.
     """
-    from filelock import FileLock, Timeout  # not before it is needed, as it takes a while
+    from filelock import FileLock, Timeout  # 27 ms, for commands that write alone
 
     path = folder / LOCK
     lock = FileLock(path, timeout=LOCK_SECONDS, poll_interval=LOCK_SECONDS / 2, fallback_to_soft=False)
@@ -103,29 +115,29 @@ def alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def write_json(path: Path, data: Any, indent: int | None = 1) -> None:
+def write_json(path: Path, data: object, indent: int | None = 1) -> None:
     """Data without NaN or infinities as JSON."""
     write_text(path, json.dumps(data, indent=indent, allow_nan=False, ensure_ascii=False) + "\n")
 
 
-def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> None:
-    with atomic(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    with atomic(path) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file)
         table.writerow(columns)
         table.writerows(rows)
 
 
 def write_text(path: Path, text: str) -> None:
-    with atomic(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    with atomic(path) as draft:
+        draft.write_text(text, encoding="utf-8")
 
 
+@dataclass
 class Unreadable(Exception):
     """A file that is not what it should be: a sentence on why, and what to do; the line, where that is in the file."""
 
-    def __init__(self, sentence: str, line: int | None = None) -> None:
-        super().__init__(sentence)
-        self.sentence, self.line = sentence, line
+    sentence: str
+    line: int | None = None
 
 
 class Words(NamedTuple):

@@ -404,7 +404,7 @@ class Code(Enum):
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
 
-    NO_REPORT = "warning: no report.html: {kind}: {text} (a fault of fpsolve; all other files are written)"
+    NO_REPORT = "warning: no {file}: {kind}: {text} (a fault of fpsolve; all other files are written)"
     NO_PICTURE = "note: this picture could not be drawn: {reason}"
 
     NO_MEMORY = "failure: not enough memory"

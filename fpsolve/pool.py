@@ -25,7 +25,8 @@ from multiprocessing import resource_tracker
 from types import ModuleType
 from typing import Any, TypeVar
 
-from fpsolve.arrays import is_whole, shown
+from fpsolve import __version__
+from fpsolve.arrays import is_whole, require, shown
 from fpsolve.budget import Meter, watched
 from fpsolve.errors import FpsolveError, WorkersDied
 
@@ -170,23 +171,24 @@ class Pool:
             raise FpsolveError(f"the processes cannot be started: {reason}; use fewer jobs") from failure
 
 
-def parallel(count: int | None = None, tasks: int = MOST_JOBS) -> Pool:
-    """Processes of this machine, but not more than there are tasks.
+def parallel(count: int | None = None) -> Pool:
+    """Processes of this machine, each of which is started when there is a task for it.
 
     Args:
-        count: how many. None: one per processor, started after this process's first 1.5 s of work.
-        tasks: how many tasks there will be, as far as that is known.
+        count: how many at most. None: one per processor, started after this process's first 1.5 s of work.
 
     Raises:
-        FpsolveError: the count is not a number of processes.
+        TypeError: the count is no whole number.
+        FpsolveError: it is not a number of processes.
     """
+    known = f"a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
+    require(count, int | None, "jobs", known)
     if count is not None and not is_whole(count, 1, MOST_JOBS):
-        known = f"must be a whole number from 1 to {MOST_JOBS}; leave it out for one process on each processor"
-        raise FpsolveError(f"jobs: got {shown(count)}; {known}")
-    size = min(count or processors(), tasks)
-    if size == 1:
-        return SERIAL
-    return Pool(partial(Processes, size), _kill, size, START_SECONDS if count is None else 0.0)
+        raise FpsolveError(f"jobs: got {shown(count)}; must be {known}")
+    size = count or processors()
+    return (
+        Pool(partial(Processes, size), size=size, own_seconds=0.0 if count else START_SECONDS) if size > 1 else SERIAL
+    )
 
 
 def cluster(address: str) -> Pool:
@@ -219,40 +221,38 @@ def cluster(address: str) -> Pool:
 
 def _client(address: str) -> Any:
     """A client of a scheduler whose workers have this version of fpsolve."""
-    from fpsolve import __version__
-
     try:
-        import distributed
+        import distributed  # 240 ms, for a cluster alone
     except ImportError:
         raise FpsolveError("Dask is not installed; install it with: pip install 'fpsolve[cluster]'") from None
     for name in ("distributed", "distributed.client", "tornado.application"):  # they report workers that come and go
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    if type(address) is not str or not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
-        raise FpsolveError(f"scheduler: got {shown(address)}; must be an address such as tcp://host:8786")
+    known = "an address such as tcp://host:8786"
+    require(address, str, "scheduler", known)
+    if not re.fullmatch(r"(tcp://)?[^/\s:]+:\d+", address):
+        raise FpsolveError(f"scheduler: got {shown(address)}; must be {known}")
+    connect: Any = distributed.Client
     try:
-        connect: Any = distributed.Client
         client = connect(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except OSError as failure:
         remedy = "start one with: dask scheduler"
         raise FpsolveError(f"no scheduler answers at {address} ({failure}); {remedy}") from failure
     try:
-        versions, threads = set(client.run(_version).values()), set(client.nthreads().values())
+        versions, threads = {*client.run(_version).values()}, {*client.nthreads().values()}
     except Exception as failure:
         client.close()
         raise FpsolveError(f"the workers of {address} cannot run fpsolve: {failure}; install it there") from failure
-    if versions != {__version__} or threads != {1}:
-        client.close()
-        state = f"have fpsolve {', '.join(versions)}, not {__version__}" if versions else "are not there"
-        state = state if versions != {__version__} else "have several threads"
-        remedy = f"dask worker {address} --nworkers -1 --nthreads 1"
-        raise FpsolveError(f"workers of {address} {state}; start them with: {remedy}")
-    return client
+    if versions == {__version__} and threads == {1}:
+        return client
+    client.close()
+    state = f"have fpsolve {', '.join(versions)}, not {__version__}" if versions else "are not there"
+    state = "have several threads" if versions == {__version__} else state
+    remedy = f"dask worker {address} --nworkers -1 --nthreads 1"
+    raise FpsolveError(f"workers of {address} {state}; start them with: {remedy}")
 
 
 def _version() -> str:
     """That of fpsolve in a worker, which uses one processor from now on."""
-    from fpsolve import __version__
-
     limit_processors(1)
     return __version__
 
@@ -268,6 +268,12 @@ class Processes(futures.ProcessPoolExecutor):
         context = multiprocessing.get_context("spawn")
         self.end: Any = context.RawValue("b", False)
         super().__init__(count, mp_context=context, initializer=_begin_worker, initargs=(self.end,))
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes, and what they do."""
+        for process in list((self._processes or {}).values()):
+            process.kill()
+        super().shutdown(wait, cancel_futures=cancel_futures)
 
 
 SERIAL = Pool(partial(Processes, 1), own_seconds=math.inf)
@@ -292,27 +298,21 @@ def _begin_worker(end: Any) -> None:
     threading.Thread(target=end_with_parent, daemon=True).start()
 
 
-def _kill(executor: Executor) -> None:
-    for process in list((getattr(executor, "_processes", None) or {}).values()):
-        process.kill()
-    executor.shutdown(cancel_futures=True)
-
-
 @contextmanager
 def _for_workers() -> Iterator[None]:
-    """Processes that are started in the body neither run the script of this one nor get the signals of a terminal.
+    """Processes that are started in the body neither run the script of this one nor get Ctrl-C from a terminal.
 
     No task needs anything of the script, which `multiprocessing` looks for in `sys.modules` without an option that says
-    otherwise; signals of a terminal are for this process.
+    otherwise.
     """
-    main, has_masks, before = sys.modules["__main__"], hasattr(signal, "pthread_sigmask"), set[Any]()
-    if has_masks:  # not on Windows
-        resource_tracker.ensure_running()  # whose start would let signals through again
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+    main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
+    if sys.platform != "win32":  # which has no masks
+        resource_tracker.ensure_running()  # whose start would let signals through again
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield
     finally:
         sys.modules["__main__"] = main
-        if has_masks:
+        if sys.platform != "win32":
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

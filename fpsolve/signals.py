@@ -1,77 +1,58 @@
-"""Signals that end work, and signals that wait until it is whole."""
+"""Signals that end work, and an import that they wait for."""
 
 from __future__ import annotations
 
-import os
 import signal
-import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from threading import current_thread, main_thread
 
-ENDING = ("SIGHUP", "SIGTERM")
-"""Signals that end a run as Ctrl-C does."""
-SIGNALLED = 128
-"""Number to which that of a signal is added in an exit code."""
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit codes after Ctrl-C and after SIGTERM."""
 
 
 @contextmanager
-def ended_by_signals() -> Iterator[list[int]]:
-    """SIGHUP and SIGTERM raise KeyboardInterrupt in the body, as Ctrl-C does; yields a list for the one that came.
+def sigterm_interrupts() -> Iterator[list[int]]:
+    """The first SIGTERM raises KeyboardInterrupt in the body, as Ctrl-C does; yields a list of those that came.
 
-    Those that follow change nothing, so that the first one's end can be written and reported. Signals that are ignored,
-    as SIGHUP under nohup, and those that the caller handles are left alone.
+    Those that follow change nothing, so that the first one's end can be written and reported. A handler of the caller
+    stays.
     """
     received: list[int] = []
 
-    def interrupt(number: int, _: Any) -> None:
-        if not received:
-            received.append(number)
+    def interrupt(number: int, _: object) -> None:
+        received.append(number)
+        if len(received) == 1:
             raise KeyboardInterrupt
 
-    with _handled(ENDING, interrupt, lambda former: former is signal.SIG_DFL):
+    if is_usual := signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, interrupt)
+    try:
         yield received
+    finally:
+        if is_usual:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Signals that Python handles wait until the body has ended: an import that may crash, files that belong together.
+    """Ctrl-C and SIGTERM wait until the body has ended: an import that would crash in one of thirty interrupts.
 
-    Signals that are ignored are left alone.
+    Those that Python does not handle are left alone, and all outside of the main thread, which alone receives them.
     """
     held: list[int] = []
+    is_main = current_thread() is main_thread()
+    former = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM) if is_main}
+    handled = {number: handler for number, handler in former.items() if callable(handler)}
+    for each in handled:
+        signal.signal(each, lambda number, _: held.append(number))
     try:
-        with _handled(("SIGINT", *ENDING), lambda number, _: held.append(number), callable):
-            yield
-    finally:
-        for number in held:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _handled(
-    names: Sequence[str], handler: Callable[[int, Any], None], is_replaced: Callable[[Any], bool]
-) -> Iterator[None]:
-    """Handle signals in the body; none outside of the main thread, which alone receives them.
-
-    Args:
-        names: of the signals; those that the system does not have are left out.
-        handler: of them, in the body.
-        is_replaced: whether a former handler gives way.
-    """
-    is_main = threading.current_thread() is threading.main_thread()
-    known = [getattr(signal, name) for name in names if is_main and hasattr(signal, name)]
-    former = {number: signal.getsignal(number) for number in known if is_replaced(signal.getsignal(number))}
-    try:
-        for number in former:
-            signal.signal(number, handler)
         yield
     finally:
-        for number, each in former.items():
-            signal.signal(number, each)
+        for number, handler in handled.items():
+            signal.signal(number, handler)
+        for came in held:
+            signal.raise_signal(came)
 
 
 def is_interrupt(failure: BaseException | None) -> bool:
@@ -79,12 +60,3 @@ def is_interrupt(failure: BaseException | None) -> bool:
     while failure is not None and not isinstance(failure, KeyboardInterrupt):
         failure = failure.__cause__ or failure.__context__
     return failure is not None
-
-
-def end_process(code: int) -> NoReturn:
-    """End this process; at once after a signal: Python makes another end of an interrupt that has passed `eval`."""
-    if code > SIGNALLED:
-        for stream in filter(None, (sys.stdout, sys.stderr)):
-            stream.flush()
-        os._exit(code)
-    sys.exit(code)

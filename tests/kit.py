@@ -61,7 +61,7 @@ COSTLY = (
     "fpsolve.solve.sensitivities.solve_sensitivities",
     "fpsolve.solve.excursions.solve_excursion",
     "fpsolve.solve.response.solve_response",
-    "fpsolve.solve.directions.densities",
+    "fpsolve.solve.eigenfunctions.densities",
 )
 """What takes more than the tolerance of Λ(p) needs."""
 TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
@@ -192,6 +192,18 @@ def sets(records: list[bytes]) -> set[bytes]:
 def files(folder: Path) -> set[str]:
     """All files below a folder, by their paths from there."""
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+LIST = "records/files.txt"
+
+
+def put(folder: Path, command: str, *names: str) -> None:
+    """Write empty files, and say in the list of the folder that a command did, for other parameters if it is new."""
+    for name in (LIST, *names):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    text = (folder / LIST).read_text() or "of other parameters\n"
+    (folder / LIST).write_text(text + "".join(f"{command} {name}\n" for name in names))
 
 
 def chain_of_masses(count, damping=0.02, spring=0):

@@ -7,11 +7,9 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError
 
-from fpsolve.analysis.target import said
-from fpsolve.arrays import FloatArray, shown
-from fpsolve.model.faults import TableError, strict_dataclass
+from fpsolve.arrays import FloatArray
+from fpsolve.model.faults import TableError, accepted, bounds_in, nearest, shown, strict_dataclass
 from fpsolve.model.parameters import parameter
 from fpsolve.model.problem import Problem, checked_problem
 
@@ -92,39 +90,48 @@ def bounds_of(problem: Problem, key: str) -> tuple[float, float]:
     """The least and the largest value that a parameter may have."""
     low, high = -math.inf, math.inf
     field = problem.parameters[key].field
-    for limit in () if field is None else field.metadata:
-        low = max(low, getattr(limit, "ge", low), math.nextafter(getattr(limit, "gt", -math.inf), math.inf))
-        high = min(high, getattr(limit, "le", high), math.nextafter(getattr(limit, "lt", math.inf), -math.inf))
+    for name, limit in bounds_in(field).items() if field else ():
+        if name in ("ge", "gt"):
+            low = limit if name == "ge" else math.nextafter(limit, math.inf)
+        else:
+            high = limit if name == "le" else math.nextafter(limit, -math.inf)
     return low, high
 
 
-def check_key(problem: Problem, key: object) -> None:
-    """Refuse what is no key of a parameter by which Λ can be differentiated. Raises `ValueError`."""
-    known = checked_problem(problem).differentiable
-    if key not in known:
-        raise ValueError(f"got {shown(key)} as a parameter; must be one of {', '.join(known) or 'none'}")
+def check_key(problem: Problem, key: object, *place: str) -> None:
+    """Refuse what is no key of a parameter by which Λ can be differentiated.
+
+    Args:
+        place: where it stands in a table, such as ("x", "key").
+
+    Raises:
+        TableError: with this place.
+    """
+    problem = checked_problem(problem)
+    if key not in (known := problem.differentiable):
+        inert = [name for half in problem.sections.values() for name in half.inert]
+        is_inert = isinstance(key, str) and key.rpartition(".")[2] in inert
+        told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
+        text = f"got {shown(key)};{nearest(key, known)} must be one of {', '.join(known) or 'none'}{told}"
+        raise TableError(f"{text}; choose one of them", *place)
 
 
 def check_axes(problem: Problem, x: Axis, y: Axis) -> None:
-    """Refuse axes that span no frame. Raises `ValueError`."""
-    known = checked_problem(problem).differentiable
-    for axis in (x, y):
+    """Refuse axes that span no frame. Raises `TableError` with the axis."""
+    for name, axis in (("x", x), ("y", y)):
         if not isinstance(axis, Axis):
-            raise ValueError(f"got {shown(axis)} as an axis; must be an Axis")
-        if axis.key not in known:
-            raise ValueError(f"got {axis.key} as an axis; the parameters are {', '.join(known) or 'none'}")
-        check_ends(problem, axis)
+            raise TableError(f"got {shown(axis)} as an axis; must be an Axis", name)
+        check_key(problem, axis.key, name, "key")
+        check_ends(problem, axis, name)
     if x.key == y.key:
-        raise ValueError(f"both axes are {x.key}; choose another parameter for one of them")
+        text = f'got "{y.key}" for both axes; must be two parameters; choose another for one of them'
+        raise TableError(text, "y", "key")
 
 
-def check_ends(problem: Problem, axis: Axis) -> None:
-    """Refuse an axis that ends where its parameter may not be. Raises `ValueError`."""
+def check_ends(problem: Problem, axis: Axis, *place: str) -> None:
+    """Refuse an axis that ends where its parameter may not be. Raises `TableError` with a place around it."""
+    low, high = bounds_of(problem, axis.key)
     for name, value in (("start", axis.start), ("stop", axis.stop)):
-        try:
-            problem.at({axis.key: value})
-        except ValidationError as failure:
-            if failure.errors()[0]["loc"]:  # of this parameter alone
-                raise ValueError(f"got {axis.key} with {name} = {value:g}: {said(failure)}") from failure
-        except ValueError:  # with other values of the other parameters it may be one
-            continue
+        if (field := problem.parameters[axis.key].field) and not low <= value <= high:
+            text = f"got {value}; {axis.key} must be {accepted(field)}; choose another value"
+            raise TableError(text, *place, name)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, require
 from fpsolve.data import Parameters, Quantity, Result, dataset
 from fpsolve.drawing import MOST_LINES, QUARTERS, draw_line, draw_plane
 from fpsolve.errors import NotConverged
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 UNSEEN = 1e-5
 """Where the density of ξ is below this share of its largest value, no picture shows it."""
+
+PAIR = "a PrincipalPair, such as ExponentSolver(problem).pair(2.0)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,6 +173,7 @@ def tilted_density(pair: PrincipalPair) -> Density | DirectionDensity:
 
 def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted"]) -> Density | DirectionDensity:
     """One of the `densities`, if it is one. Raises `NotConverged`."""
+    require(pair, PrincipalPair, "pair", PAIR)
     found, problem, name = densities(pair), pair.generator.problem, f"{kind} density"
     values = found.fields.tilted_density if kind == "tilted" else found.fields.T_adjoint
     density = OF_GRIDS[type(found.grid)](
@@ -211,6 +214,7 @@ def furstenberg_khasminskii(pair: PrincipalPair) -> float:
 
 def _of_zero(pair: PrincipalPair) -> PrincipalPair:
     """The pair, which must be that at p = 0. Raises `ValueError`."""
+    require(pair, PrincipalPair, "pair", PAIR)
     if pair.p == 0:
         return pair
     raise ValueError(f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}")

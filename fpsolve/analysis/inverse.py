@@ -28,7 +28,7 @@ from fpsolve.analysis.axis import Axis, bounds_of, check_ends, check_key
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.spreads import cube
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
-from fpsolve.arrays import FloatArray, real_number
+from fpsolve.arrays import FloatArray, real_number, require
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.error import Absent, Estimate
@@ -136,6 +136,7 @@ def design(
         NotConverged: some values on the way were not resolved.
         NoSuchExponent: Λ(p) exists nowhere in the range.
     """
+    require(by, Axis | Sequence, "by", 'a parameter such as "noise.D0", an Axis, or a list of these')
     wanted, axes = target_of(target), axes_of(problem, by)
     measures = units_of(problem, axes, units or {})
     rtol, keys = choose(problem).line_rtol(wanted.order), [axis.key for axis in axes]
@@ -178,7 +179,7 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
             raise ValueError(f"got {key} twice; remove one of them")
         axis = each if isinstance(each, Axis) else start_and_stop(problem, key)
         if axis is None:
-            raise ValueError(f'{key} is 0, which leaves its range open; state it, as in Axis("{key}", -1.0, 1.0)')
+            raise ValueError(f"{key} is 0, which leaves its range open; state both of its ends")
         check_ends(problem, axis)
         found.append(axis)
     return tuple(found)

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from fpsolve.analysis.stability import Boundary
 from fpsolve.analysis.target import Target
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 
 FINE = 16
 """Number of pieces, each way, into which a cell of the coarsest scan is divided for a picture."""
@@ -41,7 +41,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False)
-class Regions:
+class Regions(ReadOnly):
     """All of them.
 
     Attributes:

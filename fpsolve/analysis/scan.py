@@ -12,7 +12,7 @@ import numpy as np
 from contourpy import contour_generator
 from scipy.interpolate import BPoly
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.errors import FpsolveError
 from fpsolve.messages import Message
 
@@ -69,7 +69,7 @@ Field = Callable[[FloatArray], Sample]
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class Scan(ReadOnly):
     """F on a grid of the square, or on a row of it.
 
     Attributes:

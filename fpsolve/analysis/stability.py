@@ -20,7 +20,7 @@ from fpsolve.analysis.continuation import LONGEST, SHORTEST, Trace, find_branche
 from fpsolve.analysis.scan import Row, Sample, Scan, scan_row, scanned
 from fpsolve.analysis.special_points import Placed, crossings, with_folds, with_points, with_values
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
-from fpsolve.arrays import FloatArray, is_whole, real_number, shown
+from fpsolve.arrays import FloatArray, ReadOnly, is_whole, real_number, shown
 from fpsolve.budget import Meter, OverBudget
 from fpsolve.data import Result, brief, dataset
 from fpsolve.drawing import label_axes, scale_axis
@@ -61,7 +61,7 @@ def solved_anew(at: FloatArray, solve: Solve) -> Sample | Message:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Branch:
+class Branch(ReadOnly):
     """One branch of a line.
 
     Attributes:

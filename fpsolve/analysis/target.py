@@ -11,13 +11,14 @@ from typing import Any, Literal
 from pydantic import ValidationError
 
 from fpsolve.analysis.scan import Sample
-from fpsolve.arrays import FloatArray, shown
+from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Method, refuse
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
+from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, STABILITY_INDEX, Quantity, moment_at
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import (
@@ -21,10 +22,11 @@ from pydantic import (
     field_validator,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
-from fpsolve.arrays import FloatArray, shortened, shown
-from fpsolve.case.explain import explain, is_list, refuse
-from fpsolve.case.kinds import half_of, kinds_of, parameters_of, sections_of
+from fpsolve.arrays import FloatArray, require, shortened
+from fpsolve.case.explain import MOST_FAULTS, explain, refuse
+from fpsolve.case.kinds import half_of, kinds_of, system_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
 from fpsolve.case.removed import take_removed
@@ -36,6 +38,7 @@ from fpsolve.case.sections import (
     QUANTITY_NAMES,
     RESPONSE,
     SENSITIVITIES,
+    UNCERTAIN,
     ChartSection,
     ExcursionSection,
     Expectation,
@@ -53,8 +56,7 @@ from fpsolve.case.sections import (
     VarySection,
     as_kind,
 )
-from fpsolve.case.toml import Place, dotted, read_document
-from fpsolve.case.uncertain import EXAMPLE as UNCERTAIN
+from fpsolve.case.toml import Document, Place, dotted, read_document
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
@@ -68,9 +70,9 @@ from fpsolve.exponent.quantities import (
     OF_IMPACTS,
     STABILITY_INDEX,
 )
-from fpsolve.fem.mesh import CylinderMesh
+from fpsolve.fem.mesh import CylinderMesh, make_mesh, read_mesh
 from fpsolve.messages import is_control
-from fpsolve.model.faults import table_of
+from fpsolve.model.faults import table_of, written_path
 from fpsolve.model.noise import Noise
 from fpsolve.model.parameters import Parameter, Section, parameter
 from fpsolve.model.plane import System
@@ -85,8 +87,6 @@ CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
 """What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
 """Of so many curves at most the response is computed unasked, and densities of it are written."""
-MOST_FAULTS = 1000
-"""Of so many faults of a case at most each is told."""
 USUAL_P = 2.0
 
 
@@ -116,11 +116,6 @@ class Curve:
             return self.problem is not None
         except ValueError:
             return False
-
-    @property
-    def oscillator(self) -> Any:
-        """The system."""
-        return self.problem.system
 
     @property
     def noise(self) -> Noise:
@@ -220,12 +215,7 @@ class Case(Section):
     ] = ResponseSection()
     _path: Path = PrivateAttr(default=Path("case.toml"))
     _overrides: tuple[str, ...] = PrivateAttr(default=())
-    _text: str = PrivateAttr(default="")
-
-    @property
-    def oscillator(self) -> Any:
-        """The system."""
-        return self.system
+    _document: Document = PrivateAttr(default_factory=Document)
 
     @cached_property
     def problem(self) -> Problem:
@@ -248,12 +238,16 @@ class Case(Section):
     @property
     def text(self) -> str:
         """The file, as it was read."""
-        return self._text
+        return self._document.text
 
     @property
     def overrides(self) -> tuple[str, ...]:
         """What the command line has changed, as it was typed."""
         return self._overrides
+
+    def refusal(self, sentence: str, *path: str | int) -> CaseError:
+        """What is wrong with what stands at a path, told with its line."""
+        return CaseError(str(self.path), [self._document.fault(path, written_path(path), sentence)])
 
     @property
     def name(self) -> str:
@@ -276,13 +270,22 @@ class Case(Section):
         return choose(self.problem)
 
     @cached_property
+    def available(self) -> tuple[str, ...]:
+        """The names of what there is of this case; the response if some of the first curves have one."""
+        if not self.method.has_pairs:
+            return MOMENT.name, SENSITIVITIES
+        is_there = dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
+        is_there |= {EIGENFUNCTIONS: not self.method.no_picture, RESPONSE: self.responds}
+        return tuple(name for name in QUANTITY_NAMES if is_there.get(name, True))
+
+    @cached_property
     def asked(self) -> tuple[str, ...]:
         """The names of what is computed: those of [output], or else what is cheap and what other sections name."""
+        if self.output.quantities == EVERYTHING:
+            return self.available
         if self.output.names is not None:
-            has_all = self.output.lists_quantities or self.method.has_pairs
-            return self.output.names if has_all else (MOMENT.name, SENSITIVITIES)
-        named = {*CHEAP} if self.method.has_pairs else {MOMENT.name}
-        named |= {*(CHEAP_OF_WALLS if self.problem.linear.jumps else ())}
+            return self.output.names
+        named = {*CHEAP, *CHEAP_OF_WALLS}.intersection(self.available)
         named |= {RESPONSE if each.of_response else each.quantity for each in self.expect}
         named |= self.model_fields_set & {EXCURSIONS, RESPONSE}
         usual = {
@@ -291,19 +294,15 @@ class Case(Section):
             EIGENFUNCTIONS: self.output.asks_for_eigenfunctions
             or (self.output.eigenfunctions is None and self.method.pictures.is_seen),
         }
+        named -= {RESPONSE} if self.response.off else set()
         return tuple(name for name in QUANTITY_NAMES if name in named or usual.get(name))
 
     @property
     def unasked(self) -> tuple[str, ...]:
         """What else there is of this case, where it leaves open what is computed."""
-        if self.output.names is not None:
-            return ()
-        is_there = {RESPONSE: False, DERIVATIVE.name: False, EIGENFUNCTIONS: not self.method.no_picture}
-        is_there |= dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
-        if not self.method.has_pairs:
-            is_there |= dict.fromkeys({*QUANTITY_NAMES} - {MOMENT.name, SENSITIVITIES}, False)
-        known = {*self.asked} - ({EIGENFUNCTIONS} if not self.output.asks_for_eigenfunctions else set())
-        return tuple(name for name in QUANTITY_NAMES if name not in known and is_there.get(name, True))
+        known = {*self.asked, DERIVATIVE.name, RESPONSE}
+        known -= set() if self.output.asks_for_eigenfunctions else {EIGENFUNCTIONS}
+        return tuple(each for each in self.available if self.output.names is None and each not in known)
 
     @property
     def shown(self) -> FloatArray:
@@ -325,20 +324,15 @@ class Case(Section):
         return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P), default=USUAL_P))
 
     @property
-    def has_response(self) -> bool:
-        """Whether the stationary response is computed: it is named, or some of at most ten curves are nonlinear."""
-        is_named = self.output.quantities != EVERYTHING
-        return RESPONSE in self.asked and not self.response.off and (is_named or self.responds)
-
-    @property
     def leaves_out_response(self) -> bool:
-        """Whether it is not, as there are too many curves and nobody names it."""
-        return self.output.names is None and RESPONSE not in self.asked and self.responds
+        """Whether no response is computed, as there are too many curves and nobody names it."""
+        return self.output.names is None and self.responds and RESPONSE not in self.asked
 
     @cached_property
     def responds(self) -> bool:
-        """Whether some of the first curves are."""
-        return any(each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
+        """Whether some of the first curves have a response, and it is not left out."""
+        nonlinear = (each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
+        return not self.response.off and any(nonlinear)
 
     @property
     def differentiated(self) -> FloatArray:
@@ -402,18 +396,21 @@ class Case(Section):
         return f"{title}\nwith {', '.join(told)}" if told else title
 
     def cylinder_mesh(self) -> CylinderMesh | None:
-        """The mesh that the case states; None leaves it to the solver."""
-        return self.mesh.mesh(self.path.parent)
+        """The mesh that the case states, its file sought beside the case; None leaves it to the solver."""
+        stated = self.mesh.model_dump(exclude_none=True)
+        if self.mesh.file is not None:
+            return read_mesh(self.path.parent / self.mesh.file)
+        return make_mesh(**stated) if stated else None
 
     @model_validator(mode="before")
     @classmethod
-    def _is_complete(cls, data: Any) -> Any:
+    def _is_complete(cls, data: dict[str, object]) -> dict[str, object]:
         """With one system; without orders of moments where other quantities are named."""
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
             refuse([(("oscillator",), data["oscillator"], text)])
-        named: Any = table_of(data.get("output")).get("quantities")
-        is_of_p = not is_list(named) or MOMENT.name in named
+        named = table_of(data.get("output")).get("quantities")
+        is_of_p = not isinstance(named, list | tuple) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
 
     @model_validator(mode="after")
@@ -432,7 +429,7 @@ class Case(Section):
 
     @field_validator(*REFUSALS)
     @classmethod
-    def _agrees_with_those_before(cls, section: Any, info: ValidationInfo) -> Any:
+    def _agrees_with_those_before(cls, section: object, info: ValidationInfo) -> object:
         refuse(REFUSALS[str(info.field_name)](section, info.data, info.context or {}))
         return section
 
@@ -451,12 +448,13 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     Raises:
         CaseError: with every fault of the file and of the overrides, each with its line and its remedy.
     """
-    if not isinstance(path, str | Path):
-        raise TypeError(f"got {shown(path)}; must be the path of a case file")
+    require(path, str | Path, "path", "the path of a case file")
+    require(overrides, list | tuple, "overrides", 'a list of texts, such as ["noise.D0=2.0"]')
     document = read_document(path, overrides, options)
     faults, data = document.faults, document.data
     faults += (document.fault(path, dotted(path), told) for path, told in take_removed(data))
-    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds_of(data)}
+    kinds = kinds_of(data)
+    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds}
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it
@@ -464,18 +462,21 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
-        if (count := error.error_count()) > MOST_FAULTS:
-            raise CaseError(
-                str(path), [Fault("", None, f"has {count} faults; start from a copy of a case, see `fpsolve new`")]
-            ) from None
-        fields = sections_of(Case.model_fields, data)
-        faults += (document.fault(*fault) for fault in explain(error, fields, parameters_of({}, context) or {}))
+        if error.error_count() > MOST_FAULTS:
+            text = f"has over {MOST_FAULTS} faults; start from a copy of a case, see `fpsolve new`"
+            raise CaseError(str(path), [Fault("", None, text)]) from None
+        fields = dict[str, FieldInfo]()
+        for name, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
+            section = system_of(data) if name == "system" else name
+            fields[section] = copy(field)
+            fields[section].annotation = kinds.get(section, field.annotation)
+        faults += (document.fault(*fault) for fault in explain(error.errors(), fields))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
     faults += _faults_of_name(Path(path).stem)
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
-    case._path, case._overrides, case._text = Path(path), tuple(overrides), document.text
+    case._path, case._overrides, case._document = Path(path), tuple(overrides), document
     return case
 
 

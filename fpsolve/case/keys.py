@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
-from typing import Any
 
 from fpsolve.model.faults import table_of
 
 
-def get(table: Mapping[str, Any], key: str) -> Any:
+def get(table: Mapping[str, object], key: str) -> object:
     """What stands under a key; None where nothing does."""
     name, inner = _split(table, key)
     return get(table_of(table.get(name)), inner) if inner else table.get(name)
 
 
-def put(table: dict[str, Any], key: str, value: Any) -> None:
+def put(table: dict[str, object], key: str, value: object) -> None:
     """Set a key where it stands, or in nested tables. Raises `ValueError` where something around it is no table."""
     name, inner = _split(table, key)
     if not inner:
@@ -26,7 +25,9 @@ def put(table: dict[str, Any], key: str, value: Any) -> None:
     put(child, inner, value)
 
 
-def leaves(table: Mapping[str, Any], is_value: Container[str] = (), section: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(
+    table: Mapping[str, object], is_value: Container[str] = (), section: str = ""
+) -> Iterator[tuple[str, object]]:
     """All keys with their values, where the tables that have keys of `is_value` are values."""
     for name, item in table.items():
         inner = table_of(item)
@@ -36,7 +37,7 @@ def leaves(table: Mapping[str, Any], is_value: Container[str] = (), section: str
             yield section + name, item
 
 
-def _split(table: Mapping[str, Any], key: str) -> tuple[str, str]:
+def _split(table: Mapping[str, object], key: str) -> tuple[str, str]:
     """The longest beginning of a key that stands in a table, or else its first part, and the rest."""
     name = max((each for each in table if f"{key}.".startswith(f"{each}.")), key=len, default=key.partition(".")[0])
     return name, key[len(name) + 1 :]

@@ -8,20 +8,21 @@ may be several.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from copy import copy
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ValidationError, ValidationInfo, create_model
+from pydantic import ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
-from pydantic_core import InitErrorDetails
+from pydantic_core import ErrorDetails
 
-from fpsolve.case.explain import UNBOUNDED, Refusal, details_of, nearest, refuse, shown_with_kind
+from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
 from fpsolve.case.matrices import with_matrices
-from fpsolve.model.faults import TableError, fields_of, table_of
+from fpsolve.model.faults import TableError, fields_of, nearest, shown_with_kind, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import STRICT, Parametrised
+from fpsolve.model.parameters import Parametrised
 from fpsolve.model.problem import Problem
 
 Half = Literal["system", "noise"]
@@ -51,13 +52,13 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         refuse(_misnamed(names, system.noise_sections))
     if not names:
         return made_of(half, table)
-    made, faults = dict[str, Any](), list[InitErrorDetails]()
+    made, faults = dict[str, Any](), list[Refusal]()
     for name in names:
         try:
             made[name] = made_of(half, table[name])
         except ValidationError as error:
-            faults += details_of(error, name)
-    refuse([], faults)
+            faults += (((name, *each["loc"]), each["input"], each["msg"]) for each in error.errors())
+    refuse(faults)
     return noises_of(made)
 
 
@@ -85,35 +86,26 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
         yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
 
 
-def made_of(half: Half, table: Mapping[str, Any]) -> Parametrised:
-    """What a table describes. Raises `ValidationError` with all that is wrong with it."""
-    known = {key: value for key, value in table.items() if key != "kind"}
-    kind = _kind(half, table)
-    foreign = {key for key in known if key not in fields_of(kind) and not kind.takes(key, known)}
-    faults = [
-        InitErrorDetails(type="unexpected_keyword_argument", loc=(key,), input=known.pop(key))
-        for key in table
-        if key in foreign
-    ]
-    given = {word: known.pop(word) for word in kind.stated if word in known}
-    fields: Any = {word: (field.annotation, field) for word, field in kind.stated.items()}
+def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
+    """What a table describes. Raises `ValidationError` with all that is wrong with it, in our words."""
+    kind, faults = _kind(half, table), list[ErrorDetails]()
+    known = {**dict.fromkeys(table_of(table.get("parameters")), UNBOUNDED), **fields_of(kind)}
+    given = {key: value for key, value in table.items() if key != "kind"}
+    is_own = {key: key not in kind.stated and (key in known or kind.takes(key, table)) for key in given}
     try:
-        said = create_model(half, __config__=STRICT, **fields).model_validate(given)
-        known |= {word: getattr(said, word) for word in given}
+        stated = validated(kind.stated, {key: value for key, value in given.items() if not is_own[key]})
     except ValidationError as error:
-        faults += details_of(error)
+        faults, stated = error.errors(), {}
     if not (faults and any(field.is_required() for field in kind.stated.values())):
         try:
-            made = kind.from_table(known)
+            made = kind.from_table({key: value for key, value in given.items() if is_own[key]} | stated)
         except ValidationError as error:
-            faults += details_of(error)
-        except TableError as error:
-            if not faults:
-                refuse([(error.path, None, error.text)])
+            faults += error.errors()
         except (ValueError, TypeError) as error:
             if not faults:
-                raise ValueError(str(error)) from None
-    refuse([], faults)
+                path, text = (error.path, error.text) if isinstance(error, TableError) else ((), str(error))
+                refuse([(path, None, text)])
+    refuse(told(faults, known))
     return made
 
 
@@ -133,47 +125,19 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 
-def kinds_of(data: Mapping[str, Any]) -> dict[str, type[Parametrised]]:
+def kinds_of(data: Mapping[str, object]) -> dict[str, type[Parametrised]]:
     """The kinds that the tables of a case name, by their sections, as far as there are such."""
-    found = dict[str, type[Parametrised]]()
-    for half in USUAL:
-        table = data.get(half, data.get("oscillator") if half == "system" else None)
-        names = names_of(table) if half == "noise" else []
-        for section, each in [(f"{half}.{name}", table_of(table)[name]) for name in names] or [(half, table)]:
-            try:
-                found[section] = _kind(half, table_of(each))
-            except ValidationError:
-                continue
+    system, noise, found = system_of(data), table_of(data.get("noise")), dict[str, type[Parametrised]]()
+    tables = {f"noise.{name}": noise[name] for name in names_of(noise)} or {"noise": noise}
+    for section, table in {system: data.get(system), **tables}.items():
+        with suppress(ValidationError):
+            found[section] = _kind("system" if section == system else "noise", table_of(table))
     return found
 
 
-def sections_of(fields: Mapping[str, FieldInfo], data: Mapping[str, Any]) -> dict[str, FieldInfo]:
-    """The fields of a case with the kinds that its tables name, and [system] by its name in the file."""
-    found = dict[str, FieldInfo]()
-    kinds = kinds_of(data)
-    for name, field in fields.items():
-        section = "oscillator" if name == "system" and "system" not in data else name
-        found[section], table = field, table_of(data.get(section))
-        of_names = {each: kinds.get(f"noise.{each}") for each in names_of(table)} if name == "noise" else {}
-        if name in kinds or any(of_names.values()):
-            found[section] = described = copy(field)
-            described.annotation = kinds.get(name)
-            if of_names:
-                inner = {each: copy(described) for each in of_names}
-                for each, kind in of_names.items():
-                    inner[each].annotation = kind
-                described.annotation = _table_of(inner)
-            elif name == "system":
-                named = table_of(table.get("parameters"))
-                described.annotation = _table_of({**dict.fromkeys(named, UNBOUNDED), **fields_of(kinds[name])})
-            if section == "system" or "kind" in table:
-                described.description, described.examples = f"{name} of a kind", [f"[{section}]"]
-    return found
-
-
-def _table_of(fields: Mapping[str, FieldInfo]) -> Any:
-    """A type of tables with some keys."""
-    return type("Table", (), {"stated": fields})
+def system_of(data: Mapping[str, object]) -> str:
+    """What a case calls its system."""
+    return "system" if "system" in data else "oscillator"
 
 
 def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[str, FieldInfo] | None:
@@ -187,11 +151,12 @@ def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[
         known = problem.parameters.items()
         return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
     kinds: Mapping[str, type[Parametrised]] = context.get("kinds", {})
-    halves = {section.partition(".")[0] for section in kinds}
-    if halves != USUAL.keys() or not all(kind.fields() for kind in kinds.values()):
+    if len({issubclass(kind, Noise) for kind in kinds.values()}) < 2 or not all(
+        kind.fields() for kind in kinds.values()
+    ):
         return None
     return {
-        f"{kind.section if section == 'system' else section}.{name}": fields_of(kind)[name]
+        f"{section if issubclass(kind, Noise) else kind.section}.{name}": fields_of(kind)[name]
         for section, kind in kinds.items()
         for name in (*kind.fields(), *kind.words)
     }

@@ -6,13 +6,13 @@ import warnings
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, real_array, shown
+from fpsolve.arrays import FloatArray, real_array
 from fpsolve.case.explain import refuse
 from fpsolve.files import Unreadable, Words, read_bytes
+from fpsolve.model.faults import shown
 from fpsolve.model.systems.modal import MOST_MODES
 
 KEYS = ("mass", "stiffness", "damping", "gyroscopic", "circulatory", "stiffness_noise", "damping_noise")
@@ -22,7 +22,7 @@ MOST_BYTES = 2**26
 _WORDS = Words("the matrix", "a matrix", "mass.npy", ".npy, .mtx or .csv", "write rows of numbers")
 
 
-def with_matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+def with_matrices(table: Mapping[str, object], folder: Path) -> dict[str, object]:
     """The table of modes with the matrices of the files that it names. Raises `pydantic.ValidationError`."""
     found = dict(table)
     for key in KEYS:
@@ -34,7 +34,7 @@ def with_matrices(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     return found
 
 
-def _read(name: Any, folder: Path, *place: str) -> Any:
+def _read(name: object, folder: Path, *place: str) -> object:
     """The rows of a file; what is no name of one is left."""
     if not isinstance(name, str):
         return name
@@ -64,7 +64,7 @@ def _loaded(path: Path) -> FloatArray:
     content = read_bytes(path, _WORDS, MOST_BYTES)
     match path.suffix.lower():
         case ".npy":
-            from fpsolve.measured.tables import npy
+            from fpsolve.measured.tables import npy  # 12 ms
 
             return np.asarray(npy(content))
         case ".csv":
@@ -73,7 +73,7 @@ def _loaded(path: Path) -> FloatArray:
             with warnings.catch_warnings(action="ignore"):  # of empty lines
                 return np.loadtxt(BytesIO(content), delimiter=",", ndmin=2, max_rows=MOST_MODES + 1)
         case ".mtx":
-            from scipy.io import mminfo, mmread
+            from scipy.io import mminfo, mmread  # 9 ms
 
             rows, columns, entries, *_ = mminfo(BytesIO(content))
             _look_at((rows, columns))

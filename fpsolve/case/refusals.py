@@ -6,80 +6,56 @@ whether the case varies anything.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import suppress
-from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic.fields import FieldInfo
 
-from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.excursions import STATIONARY, check_start
 from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray, is_log_spaced
-from fpsolve.case.explain import Refusal, nearest, quoted, shown
-from fpsolve.case.kinds import parameters_of, problem_of
-from fpsolve.case.read_vary import column_of
+from fpsolve.case.explain import Refusal
+from fpsolve.case.kinds import problem_of
 from fpsolve.case.sections import (
     EXCURSIONS,
     RESPONSE,
-    ChartSection,
     ExcursionSection,
     Expectation,
     FigureSection,
-    MeshSection,
     Moments,
-    MonteCarloSection,
     OutputSection,
     ResponseSection,
     Varied,
     same,
 )
 from fpsolve.case.vary import Vary, assignments, map_key
-from fpsolve.errors import FpsolveError, MeshError
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.fem.mesh import CylinderMesh
-from fpsolve.fem.space import Space
-from fpsolve.model.faults import accepted
+from fpsolve.model.faults import nearest, quoted, shown
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
-from fpsolve.simulation.setup import obstacles, simulated_parts
 from fpsolve.theory.perturbation import second_order_or_none
 
 Known = Mapping[str, Any]
 MAX_CURVES = 100_000
-_MODERATE = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
     """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
-    problem = problem_of(valid)
-    method = None if problem is None else choose(problem)
-    is_told = not context.get("varies", False) or (method is not None and not method.has_pairs)
-    is_told &= method is None or method.is_computed
-    if text := _unsolvable({**valid, "moments": moments}, {}, with_moments=is_told):
-        yield (), None, text
+    if problem := problem_of(valid):
+        method = choose(problem)
+        is_told = method.is_computed and not (context.get("varies") and method.has_pairs)
+        if text := obstacle(problem, {}, moments.values, with_moments=is_told):
+            yield (), None, text
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
+    problem, moments = problem_of(valid), valid.get("moments")
     if len(vary) > MAX_CURVES:
         yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
-    elif text := _unsolvable(valid, vary.sets[0]):
-        yield ("file",) if vary.file else (), None, vary.line_of(1) + text
-
-
-def _unsolvable(valid: Known, varied: Varied, *, with_moments: bool = False) -> str:
-    """Why a set contradicts itself or overflows, or why some Λ(p) of it is not computed, or nothing."""
-    problem = problem_of(valid)
-    if problem is None or "moments" not in valid:
-        return ""
-    reason = obstacle(problem, varied, valid["moments"].values, with_moments=with_moments)
-    return _with(varied) + reason if reason else ""
+    elif problem and moments and (text := obstacle(problem, vary.sets[0], moments.values, with_moments=False)):
+        yield ("file",) if vary.file else (), None, vary.line_of(1) + _with(vary.sets[0]) + text
 
 
 def _with(varied: Varied) -> str:
@@ -92,82 +68,21 @@ def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool
     try:
         problem = base.at(varied)
         with np.errstate(all="ignore"):
-            factors = [math.exp(each * jump.log_factor) for jump in problem.linear.jumps for each in extremes]
+            factors = [np.exp(each * jump.log_factor) for jump in problem.linear.jumps for each in extremes]
             theory = second_order_or_none(problem)
             if theory is not None:
                 factors += [*theory.scale.moment(p), theory.stability_index if theory.quadratic else 0.0]
-            sizes = np.array(factors)
     except ValueError as error:
         return said(error)
-    except OverflowError:  # of R^p
-        sizes = np.array([math.inf])
-    if not np.all(np.isfinite(sizes)):
-        return f"Eqs. (37)-(38) or R^p overflow; {_MODERATE}"
+    if not np.all(np.isfinite(factors)):
+        text = "parameters and p must have moderate sizes; bring the extreme ones nearer to 1"
+        return f"Eqs. (37)-(38) or R^p overflow; {text}"
     if with_moments:
         method = choose(problem)
         for each in extremes if method.has_pairs else p.tolist():
             if told := method.reason(each):
                 return told
     return ""
-
-
-def _of_mesh(mesh: MeshSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """A mesh that cannot be read or made, is larger than the budget, or too wide for the noise of the first set."""
-    try:
-        with np.errstate(all="ignore"):
-            made = mesh.mesh(context.get("folder", Path()))
-            reason = _misfit(made, valid) if made and {"system", "noise", "budget", "vary"} <= valid.keys() else ""
-    except MeshError as error:
-        reason = error.message
-    except (OSError, ValueError) as error:
-        reason = str(error)
-    if reason:
-        text = f"got {shown(mesh.file)}; {reason}" if mesh.file else reason
-        yield ("file",) if mesh.file else (), mesh.file, text
-
-
-def _misfit(mesh: CylinderMesh, valid: Known) -> str:
-    """Why the mesh does not serve the noise of the first parameter set, or nothing."""
-    base, section, varied = valid["noise"], valid["system"].noise_sections[0], valid["vary"].sets[0]
-    if len(base.parts) > 1:
-        return "a mesh is for one noise, but there are several; leave it out, and one is chosen for each p"
-    of_noise = {key.rpartition(".")[2]: value for key, value in varied.items() if key.startswith(f"{section}.")}
-    chosen = Space.on(mesh, base.at(of_noise))
-    size, most = chosen.size, valid["budget"].most(chosen)
-    if size > most:
-        return (
-            f"makes {size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
-            "lower degrees, or a larger [budget]"
-        )
-    try:
-        for each in (chosen, chosen.enriched().enriched()):  # the finer one tells the error
-            _ = each.xi.constant
-    except MeshError as failure:
-        lines = chosen.xi.lines
-        return f"from xi = {lines[0]:g} to {lines[-1]:g} {failure}"
-    return ""
-
-
-def _of_monte_carlo(section: MonteCarloSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """The time, the step or a p of the simulation that is not right for the first parameter set."""
-    base, vary = problem_of(valid), valid.get("vary")
-    if base is None or vary is None:
-        return
-    varied, faults = vary.sets[0], dict[str, str]()
-    place = vary.line_of(1) + _with(varied)
-    try:
-        faults = obstacles(*simulated_parts(base.at(varied)), time=section.time, step=section.step)
-    except FpsolveError as error:
-        yield (), None, place + error.message
-        return
-    except ValueError:  # which [vary] tells of
-        pass
-    for name, text in faults.items():
-        if getattr(section, name) is not None:
-            yield (name,), getattr(section, name), place + text
-    p = np.array(section.p or ())
-    if section.p and (reason := obstacle(base, varied, p, with_moments=choose(base).has_pairs)):
-        yield ("p",), section.p, place + reason
 
 
 def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -185,8 +100,8 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
         return
     if figure.map and vary.crossing(figure.x) is None:
         text = (
-            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more; '
-            "vary two such keys, or remove it"
+            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more, '
+            "and x to be one of them; vary two such keys, or remove it"
         )
         yield ("map",), figure.map, text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
@@ -217,28 +132,28 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
     """Each p that is not among the moments, and each key of a `where` that is not varied, or not with that value."""
-    orders = (((i, "p"), item.p) for i, item in enumerate(expect) if item.p is not None)
-    yield from _of_orders(valid, orders, f"choose one of them, {_without('expect')}")
-    problem = problem_of(valid)
-    numbers = problem.linear.response.numbers if problem else {}
-    for i, name in ((i, each.of_response) for i, each in enumerate(expect) if each.of_response and problem):
-        if name not in numbers:
-            names = quoted(f"{RESPONSE}.{each}" for each in numbers)
-            text = f'got "{RESPONSE}.{name}"; must be one of {names} for this system; choose one of these'
-            yield (i, "quantity"), name, text
+    problem, remove = problem_of(valid), _without("expect")
     vary: Vary | None = valid.get("vary")
-    if vary is None:
-        return
-    for i, key, value in ((i, key, value) for i, item in enumerate(expect) for key, value in item.where.items()):
-        if key not in vary.keys:
-            guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
-            text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {_without('expect')}"
-            yield (i, "where", key), value, text
-        elif not any(same(value, other) for other in vary.values(key)):
-            is_possible = (type(value) is str) == vary.is_text(key)
-            remedy = f"add it to [vary], {_without('expect')}" if is_possible else "write one of these"
-            text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
-            yield (i, "where", key), value, text
+    numbers = problem.linear.response.numbers if problem else {}
+    for i, item in enumerate(expect):
+        if item.p is not None:
+            yield from _of_orders(valid, [((i, "p"), item.p)], f"choose one of them, {remove}")
+        if problem and item.of_response and item.of_response not in numbers:
+            names = quoted(f"{RESPONSE}.{each}" for each in numbers)
+            text = f'got "{item.quantity}"; must be one of {names} for this system; choose one of these'
+            yield (i, "quantity"), item.quantity, text
+        if vary is None:
+            continue
+        for key, value in item.where.items():
+            if key not in vary.keys:
+                guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
+                text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {remove}"
+                yield (i, "where", key), value, text
+            elif not any(same(value, other) for other in vary.values(key)):
+                is_possible = (type(value) is str) == vary.is_text(key)
+                remedy = f"add it to [vary], {remove}" if is_possible else "write one of these"
+                text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
+                yield (i, "where", key), value, text
 
 
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -274,54 +189,6 @@ def _unwanted(name: str, section: Section, valid: Known) -> Iterator[Refusal]:
         yield (), None, text
 
 
-def _of_chart(chart: ChartSection | None, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Axes that are none of this case, or a frame in which there is no such problem or a moment is infinite."""
-    problem, parameters = problem_of(valid), parameters_of(valid, context)
-    if chart is None or problem is None or parameters is None:
-        return
-    axes = chart.x, chart.y
-    of_x, of_y = (list(_of_axis(axis, problem, parameters)) for axis in axes)
-    yield from (((name, *path), *rest) for name, found in (("x", of_x), ("y", of_y)) for path, *rest in found)
-    if of_x or of_y:
-        return
-    ends = product((chart.x.start, chart.x.stop), (chart.y.start, chart.y.stop))
-    corners = [{chart.x.key: x, chart.y.key: y} for x, y in ends]
-    for corner in corners:
-        with suppress(ValueError):
-            if heavy := problem.at(corner).noise.tails_beyond:
-                limit, most, remedy = heavy
-                key = f"{problem.system.noise_sections[0]}.{limit}"
-                stops = {name: axis.stop for name, axis in zip("xy", axes, strict=True) if axis.key == key}
-                highest = max(float(problem.values[key]), *stops.values())
-                text = (
-                    f"{key} reaches {highest:g} in the frame; for {limit} > {most:g} the noise has algebraic tails, "
-                    f"for which there are no charts; let the axis end at {most:g}, or {remedy}"
-                )
-                yield (next(iter(stops)), "stop") if stops else (), highest, text
-                return
-    p = np.array([target.order for target in chart.lines])
-    for corner in corners:
-        if reason := obstacle(problem, corner, p):
-            yield (), None, f"{_with(corner)}{reason}; choose another frame"
-            return
-
-
-def _of_axis(axis: Axis, problem: Problem, ranges: Mapping[str, FieldInfo]) -> Iterator[Refusal]:
-    """A key that is none to differentiate by, or ends that are out of its range."""
-    known = problem.differentiable
-    if axis.key not in known:
-        inert = [name for half in problem.sections.values() for name in half.inert]
-        is_inert = any(axis.key == f"{key}.{name}" for key, half in problem.sections.items() for name in half.inert)
-        told = f"; {' and '.join(inert)} are not in the linear theory" if is_inert else ""
-        text = f'got "{axis.key}";{nearest(axis.key, known)} must be one of {", ".join(known)}{told}'
-        yield ("key",), axis.key, f"{text}; choose one of them"
-        return
-    field = ranges[axis.key]
-    for (_, i), value, _ in column_of(axis.key, [axis.start, axis.stop], field)[1]:
-        text = f"got {value}; {axis.key} must be {accepted(field)}; choose another value"
-        yield (("start", "stop")[int(i)],), value, text
-
-
 def _without(key: str) -> str:
     return f"or remove it by --set '{key}=[]'"
 
@@ -340,11 +207,8 @@ def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float
 REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {
     "moments": _of_moments,
     "vary": _of_vary,
-    "mesh": _of_mesh,
-    "monte_carlo": _of_monte_carlo,
     "figure": _of_figure,
     "output": _of_output,
-    "chart": _of_chart,
     "expect": _of_expect,
     EXCURSIONS: _of_excursions,
     RESPONSE: _of_response,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 _SETS = 'write sets of values into a file, and [vary] with file = "sets.csv"'
 REMOVED: Mapping[tuple[str, ...], str] = {
@@ -17,7 +16,7 @@ REMOVED: Mapping[tuple[str, ...], str] = {
 """What to write instead of each of them."""
 
 
-def take_removed(data: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], str]]:
+def take_removed(data: dict[str, object]) -> Iterator[tuple[tuple[str, ...], str]]:
     """Take these keys out of a case; what each is told."""
     for path, instead in REMOVED.items():
         *above, key = path

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import tomlkit
 
@@ -14,6 +13,7 @@ from fpsolve.case.case import Case
 from fpsolve.case.explain import is_number
 from fpsolve.case.keys import get, put
 from fpsolve.case.toml import document_of, loads
+from fpsolve.model.faults import table_of
 
 
 def rewritten(
@@ -22,7 +22,7 @@ def rewritten(
     values: Mapping[str, float | str] = MappingProxyType({}),
     *,
     without: Collection[str] = (),
-    lists: Mapping[str, Sequence[Any]] = MappingProxyType({}),
+    lists: Mapping[str, Sequence[object]] = MappingProxyType({}),
     more: str = "",
 ) -> str:
     """The text of a case with other values, and with what the command line has changed.
@@ -44,17 +44,17 @@ def rewritten(
     return _with_data(case.text, data) + more
 
 
-def _data(case: Case, folder: Path) -> dict[str, Any]:
+def _data(case: Case, folder: Path) -> dict[str, object]:
     """What a case says with the changes of the command line, seen from a folder."""
     document = document_of(case.text)
     for change in case.overrides:
         document.override(change, change)
-    if file := get(document.data, "mesh.file"):
-        put(document.data, "mesh.file", Path(os.path.relpath(case.path.parent / file, folder)).as_posix())
+    if case.mesh.file:
+        put(document.data, "mesh.file", Path(os.path.relpath(case.path.parent / case.mesh.file, folder)).as_posix())
     return document.data
 
 
-def _set(data: dict[str, Any], key: str, value: float | str) -> None:
+def _set(data: dict[str, object], key: str, value: float | str) -> None:
     """Set a parameter where a case states it, or else as the only value of a key that is varied."""
     section, _, name = key.rpartition(".")
     for base in (section, "system") if section == "oscillator" else (section,):
@@ -63,10 +63,10 @@ def _set(data: dict[str, Any], key: str, value: float | str) -> None:
                 if is_number(get(data, each)):
                     put(data, each, value)
                     return
-    data.setdefault("vary", {})[key] = [value]
+    data["vary"] = {**table_of(data.get("vary")), key: [value]}
 
 
-def _with_data(text: str, data: Mapping[str, Any]) -> str:
+def _with_data(text: str, data: Mapping[str, object]) -> str:
     """A text of TOML with other data, in the order and with the comments that it has."""
     document = tomlkit.parse(text)
     _update(document, data, loads(text))
@@ -74,13 +74,14 @@ def _with_data(text: str, data: Mapping[str, Any]) -> str:
     return (found if loads(found) == data else tomlkit.dumps(data)).rstrip("\n") + "\n"
 
 
-def _update(table: Any, data: Mapping[str, Any], before: Mapping[str, Any]) -> None:
+def _update(table: MutableMapping[str, object], data: Mapping[str, object], before: Mapping[str, object]) -> None:
     """Give a table the entries of data, as deep as both are tables; others stay as they are written."""
     for key in [key for key in before if key not in data]:
         del table[key]
     for key, value in data.items():
         old = before.get(key)
-        if isinstance(value, dict) and isinstance(old, dict):
-            _update(table[key], value, old)
+        inner = table.get(key)
+        if isinstance(value, dict) and isinstance(old, dict) and isinstance(inner, MutableMapping):
+            _update(inner, value, old)
         elif old != value or type(old) is not type(value):
             table[key] = value

@@ -6,9 +6,7 @@ What keys of the system, the noise and the budget mean stands where these do; th
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -19,14 +17,13 @@ from pydantic import (
     ConfigDict,
     Field,
     Tag,
-    ValidatorFunctionWrapHandler,
     WrapValidator,
     model_validator,
 )
 
 from fpsolve.analysis.axis import Axis, Scale, check_range
 from fpsolve.analysis.excursions import STATIONARY
-from fpsolve.analysis.target import EXAMPLES, Target, target_of
+from fpsolve.analysis.target import Target, target_of
 from fpsolve.arrays import FloatArray
 from fpsolve.case.explain import (
     BY_KIND,
@@ -35,19 +32,15 @@ from fpsolve.case.explain import (
     TABLE,
     WORD,
     Refusal,
-    is_list,
-    is_number,
     refuse,
-    shown,
-    shown_with_kind,
 )
 from fpsolve.case.keys import leaves
 from fpsolve.drawing import is_math
-from fpsolve.errors import MeshError
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
 from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
-from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE, CylinderMesh, make_mesh, read_mesh
+from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE
 from fpsolve.messages import is_control
+from fpsolve.model.faults import shown
 from fpsolve.model.parameters import STRICT, Section, parameter
 from fpsolve.model.quantity import DERIVATIVE, RATE_FUNCTION, Quantity, moment_at
 from fpsolve.simulation.setup import BATCHES, MAX_PATHS, PATHS, Estimator
@@ -69,19 +62,17 @@ QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
-_LARGEST = 1e30
 WANTED = (
     f"wanted relative error; if omitted {RTOL_OF_SEVERAL:g} under two noises that are not white, "
     f"{RTOL_BEYOND_PLANE:g} for more than two variables"
 )
 _APART = 1e-9
 """How far the ends of an axis are from each other at least, relative to their size."""
-_MOST_LEVELS = 100
-"""Largest number of levels of excursions."""
 _MOST_ALONG = 1000
 """Largest number of places along an axis of the density of the response."""
 _MOST_PLACES = 4_000_000
 """Largest number of places at which it is written."""
+UNCERTAIN = '[uncertain] with "noise.D0" = 0.05 or "oscillator.restitution" = { sd = 0.02 }'
 MOST_NAMED = 8
 """Curves that a legend can tell apart; of more, and of a map, colours tell the value of a key."""
 _LINES = 'lines = ["lyapunov_exponent = 0", "moment(2) = 0"]'
@@ -93,29 +84,14 @@ Varied = Mapping[str, Value]
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
-KnownName = Literal[
-    QuantityName,
-    "response.amplitude",
-    "response.amplitude_squared",
-    "response.amplitude_fourth",
-    "response.x_squared",
-    "response.v_squared",
-    "response.energy",
-    "response.impact_rate",
-]
-"""What an expectation may be of; the numbers of the response have its name before them."""
-OF_VARIABLE = r"^response\.[A-Za-z_][A-Za-z0-9_]*_squared$"
-"""The mean square of a variable of [system]."""
-
-
-def _expected(value: Any, known: ValidatorFunctionWrapHandler) -> Any:
-    """The name of a quantity; which variables there are is not known here."""
-    return value if type(value) is str and re.match(OF_VARIABLE, value) else known(value)
-
-
 ExpectedName = Annotated[
-    KnownName, WrapValidator(_expected, json_schema_input_type=KnownName | Annotated[str, Field(pattern=OF_VARIABLE)])
+    QuantityName,
+    WrapValidator(
+        lambda value, known: value if str(value).startswith(f"{RESPONSE}.") else known(value),
+        json_schema_input_type=QuantityName | Annotated[str, Field(pattern=rf"^{RESPONSE}\.")],
+    ),
 ]
+"""What an expectation may be of; the numbers of the response, which its system decides, have its name before them."""
 MarkedName = Literal["stability_index", "lyapunov_exponent"]
 
 
@@ -163,6 +139,14 @@ def flat(table: Mapping[str, Any], whole: Iterable[str] = ()) -> dict[str, Any]:
     return result
 
 
+def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list without entries that stand twice."""
+    first = dict[Any, int]()
+    twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
+    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
+    return values
+
+
 class Sweep(Section):
     """{ start, stop, num, scale }: numbers a constant step or a constant factor apart, both ends included."""
 
@@ -193,7 +177,7 @@ RANGE = frozenset(Sweep.__pydantic_fields__)
 Names: Any = Annotated[
     tuple[Literal[*QUANTITY_NAMES], ...],  # type: ignore[valid-type]
     Field(strict=False, min_length=1),
-    AfterValidator(lambda names: _distinct(names)),
+    AfterValidator(_distinct),
 ]
 
 
@@ -245,30 +229,34 @@ class VarySection(BaseModel):
 
     mode: Annotated[
         Literal["product", "zip"],
-        Field(description="product: all combinations, the last key fastest; zip: the n-th values of all keys together"),
+        parameter(
+            "product: all combinations, the last key fastest; zip: the n-th values of all keys together", 'mode = "zip"'
+        ),
     ] = "product"
-    file: Annotated[Text, Field(description="a file of sets: a header that names the keys, and a row for each set")] = (
-        ""
-    )
+    file: Annotated[
+        Text, parameter("a file of sets: a header that names the keys, and a row for each set", 'file = "sets.csv"')
+    ] = ""
 
 
-class StandardDeviation(BaseModel):
+class StandardDeviation(Section):
     """{ sd }: a standard deviation in the unit of the parameter."""
 
-    model_config = STRICT
-
-    sd: Annotated[float, Field(gt=0, description="standard deviation")]
+    sd: Annotated[float, parameter("standard deviation", "sd = 0.02", gt=0)]
 
 
-_Deviation = Annotated[float, Field(gt=0)] | StandardDeviation
-"""How uncertain a parameter is: a share of its value, or a standard deviation."""
+Deviation = Annotated[
+    Annotated[float, Field(gt=0), Tag(NUMBER)] | Annotated[StandardDeviation, Tag(TABLE)],
+    BY_KIND,
+    parameter("a share of the value > 0, or a standard deviation > 0", UNCERTAIN),
+]
+"""How uncertain a parameter is."""
 
 
 class UncertainSection(BaseModel):
     """How uncertain parameters are: by their keys, with quotes and dots or in tables."""
 
     model_config = OPEN
-    __pydantic_extra__: dict[str, _Deviation | dict[str, _Deviation | dict[str, Any]]]
+    __pydantic_extra__: dict[str, Deviation | dict[str, Deviation | dict[str, Any]]]
 
 
 class MeshSection(Section):
@@ -288,21 +276,6 @@ class MeshSection(Section):
     xi_max: Annotated[
         float | None, parameter("upper end of the noise, in standard deviations", "xi_max = 8.0", gt=0)
     ] = None
-
-    def mesh(self, folder: Path) -> CylinderMesh | None:
-        """The mesh, its file sought from `folder`; None where nothing is stated."""
-        if self.file is None:
-            stated = self.model_dump(exclude_none=True)
-            return make_mesh(**stated) if stated else None
-        from fpsolve.fem.phase import vertices_at  # takes a while to import
-
-        path = folder / self.file
-        mesh = read_mesh(path)
-        try:
-            vertices_at(mesh.phi_lines, math.pi / 2)
-        except MeshError as failure:
-            raise MeshError(f"{path}: {failure}") from failure
-        return mesh
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -326,32 +299,23 @@ class MonteCarloSection(Section):
     p: Annotated[NonEmpty | None, parameter("orders of the moments that are simulated", "p = [1.0, 2.0]")] = None
 
 
-def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A list without entries that stand twice."""
-    first = dict[Any, int]()
-    twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
-    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
-    return values
-
-
 class MomentAt(Section):
     """{ moment = p }: Λ at one p."""
 
     moment: Annotated[float, parameter("order of the moment", "moment = 2.0")]
 
 
-def _limits(value: Any) -> tuple[float, float]:
-    if is_list(value) and len(value) == 2 and all(map(is_number, value)):
-        start, stop = value
-        if max(abs(start), abs(stop)) <= _LARGEST and stop - start > _APART * max(abs(start), abs(stop)):
-            return float(start), float(stop)
-    raise ValueError(
-        f"got {shown_with_kind(value)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, "
-        "which differ in their first 9 digits; write, for example, [0.0, 4.0]"
-    )
+def _increasing(ends: tuple[float, float]) -> tuple[float, float]:
+    size = max(map(abs, ends))
+    if size > 1e30 or not ends[1] - ends[0] > _APART * size:
+        raise ValueError(
+            f"got {shown(ends)}; must be a list of two numbers, the smaller one first, from -1e30 to 1e30, which "
+            "differ in their first 9 digits; write, for example, [0.0, 4.0]"
+        )
+    return ends
 
 
-Limits = Annotated[tuple[float, float], BeforeValidator(_limits)]
+Limits = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_increasing)]
 
 
 def _drawn(text: str) -> str:
@@ -415,9 +379,6 @@ class FigureSection(Section):
         if self.x != "p" and self.y == "moment":
             text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
             refuse([(("y",), self.y, text)])
-        if self.x == "p" and self.map:
-            text = "got true; a map is drawn over two keys of [vary]; set x to one of them, or remove it"
-            refuse([(("map",), self.map, text)])
         if self.x != "p" and self.mark and "mark" in self.model_fields_set:
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
             refuse([(("mark",), self.mark, text)])
@@ -441,14 +402,8 @@ class OutputSection(Section):
         parameter("what is computed", 'quantities = ["lyapunov_exponent", "stability_index"]'),
     ] = None
     eigenfunctions: Annotated[
-        Values | None,
-        parameter(
-            "the p whose eigenfunctions are written for ParaView",
-            "eigenfunctions = [1.0, 2.0]",
-            strict=False,
-            max_length=MAX_MOMENTS,
-        ),
-        AfterValidator(lambda values: values and _distinct(values)),
+        Annotated[Values, Field(strict=False, max_length=MAX_MOMENTS), AfterValidator(_distinct)] | None,
+        parameter("the p whose eigenfunctions are written for ParaView", "eigenfunctions = [1.0, 2.0]"),
     ] = None
     figure: Annotated[bool, parameter("whether the figure is drawn", "figure = false")] = True
     sensitivities: Annotated[bool, parameter("whether sensitivities are drawn", "sensitivities = true")] = False
@@ -490,25 +445,6 @@ class OutputSection(Section):
         return self
 
 
-def _targets(value: Any) -> Any:
-    """The entries of `lines` as `Target`s; those already made are left."""
-    if not is_list(value) or not value:
-        raise ValueError(f"got {shown(value)}; must be a list with one entry at least; write, for example, {_LINES}")
-    made, refusals = list[Target](), list[Refusal]()
-    for i, entry in enumerate(value):
-        try:
-            target = entry if isinstance(entry, Target) else target_of(entry)
-        except (ValueError, TypeError):
-            known = f"must be {EXAMPLES}, all numbers finite and the order of a moment not 0"
-            refusals.append(((i,), entry, f"got {shown(entry)}; {known}; write one of these"))
-            continue
-        if target in made:
-            refusals.append(((i,), entry, f"got {shown(entry)} twice; lines must differ; remove one of them"))
-        made.append(target)
-    refuse(refusals)
-    return tuple(made)
-
-
 class ChartSection(Section):
     """[chart]: a frame of two parameters, and the lines in it."""
 
@@ -517,9 +453,9 @@ class ChartSection(Section):
     ]
     y: Annotated[Axis, as_kind(Axis), parameter("the ordinate", 'y = { key = "noise.D0", start = 0.01, stop = 2.0 }')]
     lines: Annotated[
-        tuple[Target, ...],
-        BeforeValidator(_targets, json_schema_input_type=Annotated[tuple[str, ...], Field(min_length=1)]),
-        parameter("what holds on each line", _LINES),
+        tuple[Annotated[Target, BeforeValidator(target_of, json_schema_input_type=str)], ...],
+        parameter("what holds on each line", _LINES, strict=False, min_length=1),
+        AfterValidator(_distinct),
     ]
     nodes: Annotated[
         int | None,
@@ -559,7 +495,7 @@ class ExcursionSection(Section):
             "levels = [2.0, 10.0, 100.0]",
             strict=False,
             min_length=1,
-            max_length=_MOST_LEVELS,
+            max_length=100,
         ),
     ] = (2.0, 10.0, 100.0)
     phi: Annotated[
@@ -602,7 +538,9 @@ class ResponseSection(Section):
 class Expectation(Section):
     """[[expect]]: a value that the result must have, on the curves that `where` selects."""
 
-    quantity: Annotated[ExpectedName, parameter("what is checked", 'quantity = "moment"')]
+    quantity: Annotated[
+        ExpectedName, parameter("what is checked; also response.energy and the like", 'quantity = "moment"')
+    ]
     p: Annotated[float | None, parameter("order of the moment", "p = 2.0")] = None
     value: Annotated[float, parameter("the expected value", "value = 0.01416")]
     rtol: Annotated[float | None, parameter("relative tolerance", "rtol = 1e-3", gt=0)] = None

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from fpsolve.arrays import shortened
 from fpsolve.case.keys import get, put
@@ -158,8 +158,8 @@ class Document:
         text: the file as it was read.
     """
 
-    data: dict[str, Any]
-    places: dict[str, Place]
+    data: dict[str, object] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
     faults: list[Fault] = field(default_factory=list)
     text: str = ""
 
@@ -233,7 +233,7 @@ def document_of(text: str) -> Document:
     return Document(data, {key: Place(line) for key, line in lines.items()}, text=text)
 
 
-def loads(text: str) -> dict[str, Any]:
+def loads(text: str) -> dict[str, object]:
     """The data of TOML, 0 without a sign. Raises ValueError where it is none."""
     return tomllib.loads(text, parse_float=lambda number: float(number) + 0.0)
 

@@ -3,9 +3,8 @@ from .cases import run_case as run_case
 from .chart import chart_case as chart_case
 from .check import check_case as check_case
 from .noise import noise_case as noise_case
+from .options import Flags as Flags
 from .options import Options as Options
-from .options import Reporting as Reporting
-from .options import Working as Working
-from .options import Writing as Writing
+from .options import Workers as Workers
 from .prove import prove_case as prove_case
 from .simulate import simulate_case as simulate_case

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 from pathlib import Path
-from time import monotonic
 
 from fpsolve.case.case import Case
+from fpsolve.commands.errors import NOT_CONVERGED
 from fpsolve.commands.interrupts import kept, saying_if_interrupted
-from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Reporting
+from fpsolve.commands.options import FLAGS, Cases, Done, Flags, on_cases
 from fpsolve.files import writable
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.chart import FILES, write_chart
-from fpsolve.results.folders import CHART, own_folder
+from fpsolve.results.folders import own_folder
 from fpsolve.solve.chart import (
     LINE_RECORDS,
     Chart,
     begun_lines,
+    closed_forms_of,
     dear_lines,
     key_of_line,
     recalled,
@@ -54,7 +55,7 @@ def chart_case(
         KeyboardInterrupt: its text says what is kept; the figure shows that.
     """
     refuse_no_chart(case)
-    chart, lines, started = Chart((), ()), begun_lines(case), datetime.now(UTC)
+    chart, lines, started, folder = Chart((), ()), begun_lines(case), datetime.now(UTC), Path(out) / case.name
 
     def done() -> str:
         count = sum(len(line.traces) for line in chart.lines)
@@ -64,10 +65,11 @@ def chart_case(
         if chart.lines:
             with writable(folder):
                 chart_figure(case, chart).write(folder)
-            write_report(case, folder, watch, show(case, chart), started=started, files=FILES, complete=chart.complete)
+            blocks, done = show(case, chart), chart.complete
+            write_report(case, folder, watch, blocks, started=started, files=FILES, complete=done, name="chart.html")
 
     with (
-        own_folder(case, out, (CHART,)) as folder,
+        own_folder(folder, "chart", case=case),
         saying_if_interrupted(done),
         watch.bar(Phase(case.name, "scan", sum(line.nodes**2 for line in lines), SCANNED)) as progress,
         watch.bar(Phase(case.name, "lines", unit=POINTS)) as stepped,
@@ -78,7 +80,8 @@ def chart_case(
         keys = {key_of_line(case, line): line for line in lines}
         lines = [recalled(records, *each) for each in keys.items()]
         with shown_at_the_end(draw):
-            for chart in solve_chart(case, lines, scans_of(keys, records, pool), progress=progress, stepped=stepped):
+            rows, closed = scans_of(keys, records, pool), closed_forms_of(lines)
+            for chart in solve_chart(lines, rows, closed, progress=progress, stepped=stepped):
                 write_chart(case, chart, folder)
     return chart
 
@@ -86,7 +89,7 @@ def chart_case(
 def chart(
     cases: Cases,
     *,
-    options: Reporting = ALL_OPTIONS,
+    flags: Flags = FLAGS,
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
@@ -96,21 +99,14 @@ def chart(
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0
     """
+    is_quiet = flags.options.quiet
 
-    code, loaded = 0, options.load(cases)
-    for case in loaded:
-        refuse_no_chart(case)
-    pool = options.pool()
-    for case in loaded:
-        start = monotonic()
-        if not options.quiet and (dear := dear_lines(case)):
+    def work(case: Case, pool: Pool) -> Done:
+        if not is_quiet and (dear := dear_lines(case)):
             print_blocks([note_on(case.name, dear)])
-        found = chart_case(case, options.out, pool=pool, watch=options.watch())
-        if options.quiet:
-            print_blocks(note_on(case.name, each) for each in dict.fromkeys(found.failures))
-        else:
-            print_blocks(show(case, found))
-        options.print_written(case, traced(found), monotonic() - start)
-        if found.fails:
-            code = NOT_CONVERGED
-    return code
+        found = chart_case(case, flags.out, pool=pool, watch=flags.watch())
+        failures = (note_on(case.name, each) for each in dict.fromkeys(found.failures))
+        print_blocks(failures if is_quiet else show(case, found))
+        return Done(traced(found), NOT_CONVERGED if found.fails else 0)
+
+    return on_cases(cases, flags.options, work, refuse=refuse_no_chart, workers=flags.workers, out=flags.out)

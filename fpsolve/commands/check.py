@@ -8,8 +8,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from fpsolve.case.case import Case, Curve
+from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED
 from fpsolve.commands.interrupts import ANEW, kept, of_curves, saying_if_interrupted
-from fpsolve.commands.options import CHECK_FAILED, NOT_CONVERGED, OPTIONS_OF_WORK, Cases, Working
+from fpsolve.commands.options import OPTIONS, WORKERS, Cases, Done, Options, Workers, on_cases
 from fpsolve.messages import Severity
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.solve.check import (
@@ -23,7 +24,7 @@ from fpsolve.solve.check import (
 )
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.moments import QUESTION as MOMENTS
-from fpsolve.solve.question import Job, Numerics
+from fpsolve.solve.question import Job, Numerics, refuse_mesh
 from fpsolve.tell.check import agreement, show
 from fpsolve.tell.notes import notes
 from fpsolve.tell.progress import SETS, SILENT, Phase, Watch
@@ -66,26 +67,27 @@ def check(
             "without walls, under all noise but that with algebraic tails."
         ),
     ] = False,
-    options: Working = OPTIONS_OF_WORK,
+    options: Options = OPTIONS,
+    workers: Workers = WORKERS,
 ) -> int:
     """Solve case files and compare the results with the values that they expect; write nothing.
 
     Example: fpsolve check cases/fig1.toml cases/minimal.toml
     """
 
-    code, loaded = 0, options.load(cases)
-    for case in loaded if hierarchy else ():
-        refuse_no_hierarchy(case)
-    pool = options.pool(loaded)
-    for case in loaded:
+    def work(case: Case, pool: Pool) -> Done:
         outcome = check_case(case, by_hierarchy=hierarchy, pool=pool, watch=options.watch())
         if options.quiet:
             print(f"{case.name}: {agreement(outcome.comparisons)}")
         else:
             print_blocks(show(case, outcome.comparisons))
         print_blocks(notes(case, outcome.results, ""), [Severity.FAILURE] if options.quiet else list(Severity))
-        if outcome.failures:
-            code = NOT_CONVERGED
-        elif not all(comparison.met for comparison in outcome.comparisons):
-            code = max(code, CHECK_FAILED)
-    return code
+        is_met = all(comparison.met for comparison in outcome.comparisons)
+        return Done(code=NOT_CONVERGED if outcome.failures else 0 if is_met else CHECK_FAILED)
+
+    def refuse(case: Case) -> None:
+        refuse_mesh(case)
+        if hierarchy:
+            refuse_no_hierarchy(case)
+
+    return on_cases(cases, options, work, refuse=refuse, workers=workers)

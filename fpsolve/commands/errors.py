@@ -1,18 +1,21 @@
-"""What is wrong, on the standard error."""
+"""What is wrong, on the standard error, and exit codes."""
 
 from __future__ import annotations
 
 import os
 import sys
 
+from rich.console import Console
+from rich.text import Text
+
 from fpsolve.messages import escaped, message_of
+
+CHECK_FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3
+"""Exit codes where a check fails, where input is wrong, and where something did not converge."""
 
 
 def print_error(text: str) -> None:
     """Print what is wrong on the standard error, in the words of case files."""
-    from rich.console import Console
-    from rich.text import Text
-
     try:
         Console(stderr=True).print(Text(escaped(message_of(text))), style="bold red", soft_wrap=True)
     except (OSError, SystemExit):  # there is no place left to say it

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 
-from fpsolve.commands.options import Options
+from fpsolve.commands.options import OPTIONS, Options
 from fpsolve.signals import INTERRUPTED
-
-PLAIN = Options()
+from fpsolve.tell.explore import Explorer
+from fpsolve.tell.local import LocalPage
 
 
 def explore(
     case: Path,
     *,
     no_open: bool = False,
-    options: Options = PLAIN,
+    options: Options = OPTIONS,
 ) -> int:
     """Show a case in the browser, with a slider for every parameter; end it with Ctrl-C.
 
@@ -26,11 +27,6 @@ def explore(
         case: A case file.
         no_open: Open no browser; the address is printed.
     """
-    import webbrowser
-
-    from fpsolve.tell.explore import Explorer
-    from fpsolve.tell.local import LocalPage
-
     [loaded] = options.load([case])
     with LocalPage(Explorer(loaded, f"load_case({loaded.path.name!r}).problem").answer) as page:
         print(f"{page.address} shows {loaded.name}; Ctrl-C ends it", flush=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fpsolve.commands.options import Count
+from fpsolve.fem.mesh import make_mesh, write_mesh
 from fpsolve.messages import escaped
 
 
@@ -35,8 +36,6 @@ def mesh(
         grading: Size of the outermost noise cells divided by that of the innermost; 1 is uniform.
         full_circle: Mesh the whole circle of phases instead of one half.
     """
-    from fpsolve.fem.mesh import make_mesh, write_mesh
-
     made = make_mesh(
         phi_cells=phi_cells,
         phi_degree=phi_degree,

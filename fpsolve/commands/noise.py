@@ -4,27 +4,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from fpsolve.commands.options import NOT_CONVERGED, Count, Options
+from fpsolve.case.case import Case
+from fpsolve.commands.errors import NOT_CONVERGED
+from fpsolve.commands.options import OPTIONS, Count, print_in_one_line
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
-from fpsolve.files import alone, writable, write_json, write_text
+from fpsolve.files import writable, write_json, write_text
 from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
 from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
-from fpsolve.measured.reading import checked_scale
+from fpsolve.measured.reading import Mode, checked_scale
 from fpsolve.measured.signals import SIGNALS, factor_of, powers
 from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.units import GRAVITY
 from fpsolve.messages import escaped
+from fpsolve.results.folders import own_folder
 from fpsolve.results.noise import case_of, noise_sections, summary
 from fpsolve.solve.noise import (
     FILES,
+    RTOL,
+    SECONDS,
     STEPS_OF_A_FIT,
     Modes,
     NoiseOutcome,
@@ -38,27 +43,13 @@ from fpsolve.tell.progress import SILENT, SOLVES, Phase, Watch
 from fpsolve.tell.solved import last_line
 from fpsolve.tell.terminal import print_blocks
 
-if TYPE_CHECKING:
-    from fpsolve.case.case import Case
-    from fpsolve.solve.noise import Modes
-
-
-def write_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> list[str]:
-    """noise.json, noise.png, noise.pdf, and noise.toml where there is a system: their names."""
-    text = case_of(outcome, folder)
-    write_json(folder / "noise.json", summary(outcome, source))
-    if text:
-        write_text(folder / "noise.toml", text)
-    else:  # of other options
-        (folder / "noise.toml").unlink(missing_ok=True)
-    draw_noise(outcome, source, shown, folder)
-    return [name for name in FILES if text or name != "noise.toml"]
-
 
 def noise_case(
     data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
 ) -> tuple[NoiseOutcome, Path, list[str]]:
     """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
+
+    noise.json, noise.png and noise.pdf are written, and where there is a system noise.toml, a case.
 
     Args:
         data, wanted: see `measure`.
@@ -80,13 +71,13 @@ def noise_case(
             outcome = measure(data, wanted, progress)  # the arrays are small
     except FpsolveError as error:
         raise FpsolveError(f"{source}: {error}") from None
-    with alone(folder), writable(folder):
-        names = write_noise(outcome, source, shown, folder)
-    return outcome, folder, names
-
-
-CLOSE = 0.02
-"""By which share of it two statements of a frequency may differ."""
+    with own_folder(folder, "noise"), writable(folder):
+        text = case_of(outcome, folder)
+        write_json(folder / "noise.json", summary(outcome, source))
+        if text:
+            write_text(folder / "noise.toml", text)
+        draw_noise(outcome, source, shown, folder)
+    return outcome, folder, [name for name in FILES if text or name != "noise.toml"]
 
 
 @Parameter(name="*")
@@ -167,6 +158,21 @@ class Statement:
     averages: float | None = None
 
 
+NOTHING_STATED = Statement()
+OF_SPECTRA, OF_RECORDS, OF_FILES = ("sided", "averages", "row", "log_log"), ("segment", "rate"), ("over", "skip")
+"""Options for files alone: of one kind, of any."""
+RANGES = {
+    "gm": (0.0, math.inf, "> 0, in m"),
+    "length": (0.0, math.inf, "> 0, in m"),
+    "rtol": (0.0, 1.0, "> 0 and < 1"),
+    "seconds": (0.0, math.inf, "> 0, in seconds"),
+    "frequency": (1e-12, 1e12, "> 1e-12 and < 1e12; state it in Hz"),
+    "damping_ratio": (-1.0, 1.0, "> -1 and < 1; 0.01 is 1 % of critical damping"),
+    "restitution": (0.0, 1.0 + 1e-15, "> 0 and <= 1; 1 means no wall"),
+}
+"""Between which numbers the values of options are, and how that is said."""
+
+
 def measurement_of(
     spectrum: Path | None, stated: Statement, case: Case | None
 ) -> tuple[Spectrum | Record, Wanted, Path]:
@@ -175,160 +181,114 @@ def measurement_of(
     Raises:
         FpsolveError: the options contradict each other, or a file cannot be read.
     """
-
-    of = stated.of or stated.noise_in or "stiffness"
-    place = SIGNALS[of].noise_in
+    given, of = vars(stated), stated.of or stated.noise_in or "stiffness"
+    place, source = SIGNALS[of].noise_in, spectrum or stated.record or Path(stated.named or "")
+    has_file = bool(spectrum or stated.record)
     if stated.noise_in not in (None, place):
         raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
-    source = spectrum or stated.record or (Path(stated.named) if stated.named else None)
-    if source is None:
+    if not source.name:
         raise FpsolveError("name a file, that of a spectrum or of a record by --record, or a density by --named")
-    if stated.named and (spectrum or stated.record):
-        raise FpsolveError("--named is in place of a file; leave one of them out")
-    if stated.parameters and not stated.named:
-        raise FpsolveError("--parameters are those of --named; name a density, or leave them out")
-    modes = _modes(stated, of, case)
+    for options, is_wrong, told in (
+        (["named"], has_file, "is in place of a file, and one was named"),
+        (["parameters"], not stated.named, "are those of --named"),
+        ([*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column"], not has_file, "is for a file, and a density was named"),
+        (OF_SPECTRA, not spectrum, "is for a spectrum, and a record was named"),
+        (OF_RECORDS[: 1 if stated.record else 2], spectrum, "is for a record, and a spectrum was named"),
+        (["gm"], of != "height", "belongs to --of height"),
+        (["length"], of != "acceleration", "is for --of acceleration"),
+        (["mode"], not stated.modes, "is for the table that --modes names"),
+        (["damping_ratio", "restitution", "modes"], case, "is of the system, which --case states"),
+    ):
+        for option in options:
+            if is_wrong and given[option] != vars(NOTHING_STATED)[option]:
+                raise FpsolveError(f"--{option.replace('_', '-')} {told}; leave it out")
+    if of == "height" and stated.gm is None:
+        raise FpsolveError("--of height needs --gm; state the mean metacentric height in m by --gm")
+    if stated.restitution is not None and stated.damping_ratio is None and not stated.modes:
+        raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
+    for option, (low, high, accepted) in RANGES.items():
+        for value in given[option] if isinstance(given[option], list) else [given[option]]:
+            if value is not None and not low < value < high:
+                raise FpsolveError(f"got --{option.replace('_', '-')} {value:g}; must be {accepted}")
+    modes = _modes(stated, case)
     if case:
         refuse_wrong_case(case, of, stated.terms)
-    if (of == "height") != (stated.gm is not None):
-        remedy = "leave it out" if stated.gm is not None else "state the mean metacentric height in m by --gm"
-        raise FpsolveError(f"--gm belongs to --of height; {remedy}")
-    if stated.gm is not None and not 0 < stated.gm < math.inf:
-        raise FpsolveError(f"got --gm {stated.gm}; must be > 0, in m")
-    wanted = Wanted(of, stated.kind, stated.terms, modes, stated.gm, case, stated.segment)
-    limits = {name: each for name in ("rtol", "seconds") if (each := getattr(stated, name)) is not None}
-    for name, each in limits.items():
-        if not 0 < each < math.inf or (name == "rtol" and each >= 1):
-            raise FpsolveError(f"got --{name} {each:g}; must be > 0{' and < 1' if name == 'rtol' else ', in seconds'}")
-    wanted = replace(wanted, **limits)
+    limits = stated.rtol or RTOL, stated.seconds or SECONDS
+    wanted = Wanted(of, stated.kind, stated.terms, modes, stated.gm, case, stated.segment, *limits)
     if stated.named:
-        of_files = "rate", "segment", "sided", "averages", "column", "over", "row", "skip", "log_log"
-        _refuse_stated(stated, of_files, "is for a file, and a density was named")
-        return _named(stated, of, 2 * modes.omega[0]), wanted, source
-    how: dict[str, Any] = {
-        "of": of,
-        "unit": stated.unit,
-        "scale": stated.scale,
-        "skip": stated.skip,
-        "over": stated.over,
-    }
-    of_record = how if spectrum is None else {"of": of}
-    record = read_record(stated.record, rate=stated.rate, column=stated.column, **of_record) if stated.record else None
-    if spectrum is not None:
-        of_records = "segment", *(["rate"] if record is None else [])
-        _refuse_stated(stated, of_records, "is for a record, and a spectrum was named")
-    if spectrum is None and record is not None:
-        names = "sided", "averages", "row", "log_log"
-        _refuse_stated(stated, names, "is for a spectrum, and a record was named")
-        return record, wanted, source
-    data = read_spectrum(
-        spectrum or source,
-        per=stated.per,
-        sided=stated.sided,
-        column=stated.column if record is None else None,
-        row=stated.row,
-        log_log=stated.log_log,
-        averages=stated.averages,
-        variance=None if record is None else float(record.values.var()),
-        **how,
-    )
-    return data, wanted, source
+        return _named(stated.named, stated, of, 2 * modes.omega[0]), wanted, source
+
+    def chosen(*options: str) -> dict[str, Any]:
+        return {option: given[option] for option in options}
+
+    how, variance = chosen(*OF_FILES, "unit", "scale"), None
+    if stated.record:
+        record = read_record(stated.record, of=of, **chosen("rate", "column"), **({} if spectrum else how))
+        if not spectrum:
+            return record, wanted, source
+        variance, how["column"] = float(record.values.var()), None
+    how = chosen("per", "column", *OF_SPECTRA) | how
+    return read_spectrum(source, of=of, variance=variance, **how), wanted, source
 
 
-def _refuse_stated(stated: Statement, names: Sequence[str], told: str) -> None:
-    """Refuse options that are for something else. Raises `FpsolveError`."""
-    for name in names:
-        if getattr(stated, name) != getattr(NOTHING_STATED, name):
-            raise FpsolveError(f"--{name.replace('_', '-')} {told}; leave it out")
-
-
-def _named(stated: Statement, of: str, near: float) -> Spectrum:
+def _named(name: str, stated: Statement, of: str, near: float) -> Spectrum:
     """The density that is named, in the unit of its signal."""
-
-    assert stated.named is not None
+    signal = SIGNALS[of]
     try:
-        found = named_spectrum(stated.named, near, **parameters_of(stated.parameters))
-        unit = stated.unit or NAMED[stated.named].unit
-        if stated.scale == 1.0 and powers(unit) not in [powers(each) for each in SIGNALS[of].units]:
-            signal = SIGNALS[of]
-            text = (
-                f"is in {unit}, and {signal.words} in {signal.unit}; state by --scale how much of this is in one {unit}"
-            )
-            raise ValueError(f"{stated.named} {text}")
+        found = named_spectrum(name, near, **parameters_of(stated.parameters))
+        unit = stated.unit or NAMED[name].unit
+        if stated.scale == 1.0 and powers(unit) not in [powers(each) for each in signal.units]:
+            remedy = f"state by --scale how much of this is in one {unit}"
+            raise ValueError(f"{name} is in {unit}, and {signal.words} in {signal.unit}; {remedy}")
         factor = factor_of(of, powers(unit), unit) if stated.scale == 1.0 else checked_scale(stated.scale)
     except ValueError as error:
         raise FpsolveError(f"--named: {error}") from None
     return found.scaled(factor)
 
 
-def _modes(stated: Statement, of: str, case: Case | None) -> Modes:
+def _modes(stated: Statement, case: Case | None) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
-    import numpy as np
-
-    restitution, zeta = stated.restitution, stated.damping_ratio
-    if zeta is not None and math.isnan(zeta):
-        raise FpsolveError("got --damping-ratio nan; must be -1 < value < 1; leave it out if it is not known")
-    if stated.mode and stated.modes is None:
-        raise FpsolveError("--mode is for the table that --modes names; name one, or leave it out")
-    if case and (zeta is not None or restitution is not None or stated.modes is not None):
-        raise FpsolveError("--case states the system; leave out --damping-ratio, --restitution and --modes")
-    if stated.restitution is not None and zeta is None and stated.modes is None:
-        raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
-    hertz = UNITS[stated.per or "Hz"] / (2 * math.pi)
-    found = dict[str, tuple[float, ...]]()
-    if stated.frequency:
-        found["--frequency"] = tuple(each * hertz for each in stated.frequency)
-    if stated.length is not None:
-        if of != "acceleration" or not 0 < stated.length < math.inf:
-            raise FpsolveError(f"got --length {stated.length}; must be > 0, in m, and is for --of acceleration")
-        found["--length"] = (math.sqrt(GRAVITY / stated.length) / (2 * math.pi),)
-    if case:
-        found["--case"] = tuple(each / (2 * math.pi) for each in natural_frequencies(case.system)[:2])
-        if not found["--case"]:
-            raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
-    table = modes_from(stated.modes, stated.mode or (), restitution) if stated.modes else None
-    if table is not None:
-        found["--modes"] = tuple(each / (2 * math.pi) for each in table.omega)
-    if not found:
+    table, zeta = _rows(stated), stated.damping_ratio
+    unit = UNITS[stated.per or "Hz"]
+    found = {
+        "--frequency": [unit * each for each in stated.frequency or ()],
+        "--length": [math.sqrt(GRAVITY / stated.length)] if stated.length else [],
+        "--case": [*natural_frequencies(case.system)[:2]] if case else [],
+        "--modes": [2 * math.pi * each.frequency for each in table],
+    }
+    if case and not found["--case"]:
+        raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
+    told = {
+        option: ", ".join(f"{each / (2 * math.pi):.4g} Hz" for each in omega)
+        for option, omega in found.items()
+        if omega
+    }
+    if not told:
         raise FpsolveError("state the natural frequency by --frequency, or a system by --case or --modes")
-    (first, frequencies), *others = found.items()
-    for name, other in others:
-        if len(other) != len(frequencies) or not np.allclose(np.sort(other), np.sort(frequencies), rtol=CLOSE):
-            told = " and ".join(f"{key} {', '.join(f'{f:.4g} Hz' for f in each)}" for key, each in found.items())
-            raise FpsolveError(f"got {told}; leave out one of {first} and {name}")
-    known = zeta if zeta is not None else table.zeta if table is not None else math.nan
-    for option, values, low, high, remedy in (
-        ("--frequency", frequencies, 1e-12, 1e12, "state it in Hz"),
-        ("--damping-ratio", [] if math.isnan(known) else [known], -1.0, 1.0, "0.01 is 1 % of critical damping"),
-        ("--restitution", [] if restitution is None else [restitution], 0.0, 1.0 + 1e-15, "1 means no wall"),
-    ):
-        for value in values:
-            if not low < value < high:
-                raise FpsolveError(f"got {option} {value:g}; must be > {low:g} and < {high:g}; {remedy}")
-    if len(frequencies) > 2:
-        raise FpsolveError(f"got {len(frequencies)} frequencies; must be one or two; choose those of the coupled modes")
-    return Modes(tuple(2 * math.pi * each for each in frequencies), known, restitution)
+    if len(told) > 1:
+        text = " and ".join(f"{option} {words}" for option, words in told.items())
+        raise FpsolveError(f"got {text}; leave out one of {' and '.join(told)}")
+    [omega] = filter(None, found.values())
+    if len(omega) > 2:
+        raise FpsolveError(f"got {len(omega)} frequencies; must be one or two; choose those of the coupled modes")
+    known = zeta if zeta is not None else table[0].damping_ratio if table else math.nan
+    return Modes(tuple(omega), known, stated.restitution)
 
 
-def modes_from(path: Path, numbers: Sequence[int], restitution: float | None) -> Modes:
-    """One or two modes of a table, by their rows from 1 on; all if none are stated. Unknown damping is NaN.
-
-    Raises:
-        FpsolveError: the file is none, there are more than two modes, or a number is none of a row.
-    """
-
-    found = read_modes(path)
-    for number in numbers:
-        if not 1 <= number <= len(found):
-            raise FpsolveError(f"{path}: got --mode {number}; must be from 1 to {len(found)}, the number of its row")
-    chosen = [found[number - 1] for number in numbers] if numbers else found
+def _rows(stated: Statement) -> Sequence[Mode]:
+    """The rows of the table of modes that are chosen, one or two; none without a table."""
+    if stated.modes is None:
+        return ()
+    rows = read_modes(stated.modes)
+    for number in stated.mode or ():
+        if not 1 <= number <= len(rows):
+            must = f"must be from 1 to {len(rows)}, the number of its row"
+            raise FpsolveError(f"{stated.modes}: got --mode {number}; {must}")
+    chosen = [rows[number - 1] for number in stated.mode] if stated.mode else rows
     if len(chosen) > 2:
-        raise FpsolveError(f"{path}: has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2")
-    omega = tuple(2 * math.pi * each.frequency for each in chosen)
-    return Modes(omega, chosen[0].damping_ratio, restitution)
-
-
-NOTHING_STATED = Statement()
+        text = f"has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2"
+        raise FpsolveError(f"{stated.modes}: {text}")
+    return chosen
 
 
 def noise(
@@ -355,12 +315,12 @@ def noise(
     """
 
     start = monotonic()
-    case = Options().load([stated.case])[0] if stated.case else None
+    case = OPTIONS.load([stated.case])[0] if stated.case else None
     data, wanted, source = measurement_of(spectrum, stated, case)
     shown = Convention(stated.per or "Hz", stated.sided or "one")
-    outcome, folder, names = noise_case(data, wanted, source, shown, out, Options().watch(is_json=json))
+    outcome, folder, names = noise_case(data, wanted, source, shown, out, OPTIONS.watch(is_json=json))
     if json:
-        print(" ".join(line.strip() for line in (folder / names[0]).read_text(encoding="utf-8").splitlines()))
+        print_in_one_line(folder / names[0])
     else:
         print(escaped(noise_sections(outcome).strip()), end="\n\n")
         print_blocks(show(outcome, source, shown))

@@ -1,30 +1,30 @@
-"""Options that several commands take, and what becomes of them."""
+"""Options that several commands take, and the loop of all commands on cases."""
 
 from __future__ import annotations
 
 import os
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from shlex import quote
+from time import monotonic
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter, Token
 
+from fpsolve.case.case import Case, load_case
+from fpsolve.commands.errors import print_error
 from fpsolve.errors import CaseError, FpsolveError
 from fpsolve.messages import Severity
-
-if TYPE_CHECKING:
-    from fpsolve.case.case import Case
-    from fpsolve.pool import Pool
-    from fpsolve.tell.progress import Watch
-
-CHECK_FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3
-"""Exit codes of commands."""
+from fpsolve.pool import Pool, cluster, limit_processors, parallel
+from fpsolve.signals import INTERRUPTED
+from fpsolve.tell.progress import Bars, Watch
+from fpsolve.tell.solved import last_line
+from fpsolve.tell.terminal import print_blocks
 
 
 def _whole(_: type, tokens: Sequence[Token]) -> int:
@@ -65,8 +65,6 @@ class Options:
             paths: their files.
             typed: more assignments, by how messages shall call them.
         """
-        from fpsolve.case.case import load_case
-
         cases, errors = [], []
         for path in paths:
             try:
@@ -84,46 +82,16 @@ class Options:
 
     def watch(self, *, is_json: bool = False) -> Watch:
         """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
-        from fpsolve.tell.progress import Bars, Watch
-        from fpsolve.tell.terminal import print_blocks
-
         if self.quiet:
             return Watch(noted=partial(print_blocks, severities=[Severity.FAILURE]), said=print_blocks)
-        tables: dict[str, Any] = {} if is_json else {"shown": print_blocks}
-        return Watch(Bars().bar, noted=print_blocks, said=print_blocks, **tables)
+        watch = Watch(Bars().bar, noted=print_blocks, said=print_blocks)
+        return watch if is_json else replace(watch, shown=print_blocks)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Writing(Options):
-    """What commands take that write files.
-
-    Attributes:
-        out: Folder for the results.
-    """
-
-    out: Path = Path("results")
-
-    def load(self, paths: Sequence[Path], typed: Mapping[str, str] = MappingProxyType({})) -> list[Case]:
-        """All cases, or an error also where two would write into one folder."""
-        cases = super().load(paths, typed)
-        for name, count in Counter(case.name for case in cases).items():
-            if count > 1:
-                raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
-        return cases
-
-    def print_written(self, case: Case, what: str, seconds: float, known: str = "") -> None:
-        """Print where the results of a case are, and how long that took."""
-        from fpsolve.tell.solved import last_line
-        from fpsolve.tell.terminal import print_blocks
-
-        print_blocks([last_line(self.out / case.name, what, seconds, known)])
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Working(Options):
-    """What commands take that several processes may share.
+class Workers:
+    """Who works.
 
     Attributes:
         jobs: Number of processes; if omitted, the number of processors.
@@ -133,33 +101,100 @@ class Working(Options):
     jobs: Count | None = None
     scheduler: str = ""
 
-    def pool(self, cases: Sequence[Case] = ()) -> Pool:
-        """Who does the work; no more processes than a case has sets, where cases are given."""
-        from fpsolve.pool import MOST_JOBS, cluster, limit_processors, parallel
-
+    def pool(self) -> Pool:
+        """The processes of this machine, or the workers of a cluster."""
         if self.jobs is not None and self.scheduler:
             raise FpsolveError("--jobs is for this machine, and --scheduler for a cluster; name one of them")
-        most = max((case.planned for case in cases), default=MOST_JOBS)
-        pool = cluster(self.scheduler) if self.scheduler else parallel(self.jobs, most)
+        pool = cluster(self.scheduler) if self.scheduler else parallel(self.jobs)
         if self.jobs is not None:
             limit_processors(self.jobs)
         return pool
 
 
+OPTIONS, WORKERS = Options(), Workers()
+"""As they are where none is stated."""
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Reporting(Writing, Working):
-    """What commands take that can write a report.
+class Flags:
+    """What commands take that work on cases, write files, and report.
 
     Attributes:
-        report: Also write report.html: one page with all results and figures.
+        out: Folder for the results.
+        report: Also write a report: one page, .html, with all results and figures.
     """
 
+    options: Options = OPTIONS
+    workers: Workers = WORKERS
+    out: Path = Path("results")
     report: bool = False
 
-    def watch(self, *, is_json: bool = False) -> Watch:
-        return replace(super().watch(is_json=is_json), has_report=self.report)
+    def watch(self, *, is_json: bool = False, is_whole: bool = False) -> Watch:
+        """See `Options.watch`."""
+        return replace(self.options.watch(is_json=is_json), has_report=self.report, is_whole=is_whole)
 
 
-OPTIONS_OF_WORK, OPTIONS_OF_FILES, ALL_OPTIONS = Working(), Writing(), Reporting()
+FLAGS: Flags = Flags()
 """As they are where none is stated."""
+
+
+class Done(NamedTuple):
+    """What a command has done with a case.
+
+    Attributes:
+        what: is in the folder of its results now, for the last line; empty where none is printed.
+        code: the exit code.
+        known: how much of it an earlier run had done.
+        interruption: where an interrupt has ended the work, and with it the command.
+    """
+
+    what: str = ""
+    code: int = 0
+    known: str = ""
+    interruption: str = ""
+
+
+def on_cases(
+    paths: Sequence[Path],
+    options: Options,
+    work: Callable[[Case, Pool], Done],
+    *,
+    typed: Mapping[str, str] = MappingProxyType({}),
+    refuse: Callable[[Case], object] = lambda _: None,
+    workers: Workers = WORKERS,
+    out: Path | None = None,
+) -> int:
+    """Read all cases, work on one after the other, say where its files are, and return the largest exit code.
+
+    Args:
+        paths: the files of the cases.
+        work: does what the command is for.
+        typed: see `Options.load`.
+        refuse: raises `FpsolveError` where there is no such work on a case; before any is begun.
+        workers: who works.
+        out: where the folders of the cases are, if files are written.
+    """
+    cases = options.load(paths, typed)
+    for name, count in Counter(case.name for case in cases).items():
+        if out and count > 1:
+            raise FpsolveError(f'several cases are called "{name}" and would overwrite each other; run them apart')
+    for case in cases:
+        refuse(case)
+    pool, code = workers.pool(), 0
+    for case in cases:
+        start = monotonic()
+        done = work(case, pool)
+        if done.interruption:
+            print_error(done.interruption)
+        if out and done.what:
+            print_blocks([last_line(out / case.name, done.what, monotonic() - start, done.known)])
+        if done.interruption:
+            return INTERRUPTED
+        code = max(code, done.code)
+    return code
+
+
+def print_in_one_line(path: Path) -> None:
+    """Print a file of JSON."""
+    print(" ".join(line.strip() for line in path.read_text(encoding="utf-8").splitlines()))

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from functools import partial
+from operator import call
 from pathlib import Path
-from time import monotonic
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from fpsolve.case.case import Case
-from fpsolve.commands.errors import print_error
+from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED, print_error
 from fpsolve.commands.interrupts import kept, saying_if_interrupted
-from fpsolve.commands.options import ALL_OPTIONS, CHECK_FAILED, NOT_CONVERGED, Reporting
+from fpsolve.commands.options import FLAGS, Done, Flags, Options, on_cases
 from fpsolve.errors import FpsolveError
 from fpsolve.files import writable
 from fpsolve.messages import escaped
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.results.folders import PROVEN, own_folder
+from fpsolve.results.folders import own_folder
 from fpsolve.results.prove import PROOF, write_proof
 from fpsolve.solve.prove import (
     PROVEN_BOUNDS,
     PROVEN_RECORDS,
     Answer,
     CurveProof,
-    answer,
     asked_of,
     check_proof,
     gathered,
@@ -62,27 +62,28 @@ def prove_case(
     """
     refuse_unprovable_case(case, width)
     answers, proofs, total = list[Answer](), list[CurveProof](), len(asked_of(case)) * case.planned
-    started = datetime.now(UTC)
+    folder, started = Path(out) / case.name, datetime.now(UTC)
 
     def finish() -> None:
         proofs[:], is_whole = gathered(case, answers), len(answers) == total
         if proofs:
             with writable(folder):
                 write_proof(case, proofs, folder, is_whole=is_whole)
-            write_report(case, folder, watch, show(case, proofs), started=started, files=[PROOF], complete=is_whole)
+            blocks = show(case, proofs)
+            write_report(
+                case, folder, watch, blocks, started=started, files=[PROOF], complete=is_whole, name="proof.html"
+            )
 
     with (
-        own_folder(case, out, (PROVEN,)) as folder,
+        own_folder(folder, "prove", case=case),
         saying_if_interrupted(lambda: kept(len(answers), f"of {total} bounds", folder)),
         watch.bar(Phase(case.name, "proving", total, BOUNDS)) as progress,
         pool,
         shown_at_the_end(finish),
     ):
-        records, how = (
-            Records(folder / PROVEN_RECORDS),
-            dict[str, Any](kind=PROVEN_BOUNDS, key=key_of_bounds, keeps=is_kept),
-        )
-        for _, found, is_known in answered(records, pool, answer, questions(case, width), **how):
+        records, asked = Records(folder / PROVEN_RECORDS), questions(case, width)
+        of_all = answered(records, pool, call, asked, kind=PROVEN_BOUNDS, key=key_of_bounds, keeps=is_kept)
+        for _, found, is_known in of_all:
             answers.append(found)
             progress(failed=not found.is_proven, known=is_known)
     return proofs
@@ -96,7 +97,7 @@ def prove(
     *,
     width: float | None = None,
     check: Path | None = None,
-    options: Reporting = ALL_OPTIONS,
+    flags: Flags = FLAGS,
 ) -> int:
     """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
 
@@ -116,32 +117,33 @@ def prove(
     if (check is None) == (not cases):
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
-        if width is not None or options != Reporting(quiet=options.quiet):
+        if width is not None or flags != Flags(Options(flags.options.quiet)):
             raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
-        checked = check_proof(check)
-        for text in checked.objections:
-            print_error(f"{check}: {text}")
-        bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
-        if checked.objections:
-            objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
-            print(f"rejected: {escaped(str(check))} ({objections}, {bounds})")
-            return CHECK_FAILED
-        unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
-        print(f"accepted: {escaped(str(check))} ({bounds} follow from their certificates{unfinished})")
-        print("note: parameters are labels; the bounds are of the matrices and rates that the certificates state")
-        return 0
-    code, loaded = 0, options.load(cases or [])
-    for case in loaded:
-        refuse_unprovable_case(case, width)
-    pool = options.pool()
-    for case in loaded:
-        start = monotonic()
-        proofs = prove_case(case, options.out, width=width, pool=pool, watch=options.watch())
-        if not options.quiet:
+        return verify(check)
+
+    def work(case: Case, pool: Pool) -> Done:
+        proofs = prove_case(case, flags.out, width=width, pool=pool, watch=flags.watch())
+        if not flags.options.quiet:
             print_blocks(show(case, proofs))
         unmet = sum(not each.is_met for each in proofs)
         what = done_of(case, len(proofs), unmet, "not as close as wanted")
-        options.print_written(case, what, monotonic() - start)
-        if unmet:
-            code = NOT_CONVERGED
-    return code
+        return Done(what, NOT_CONVERGED if unmet else 0)
+
+    refuse = partial(refuse_unprovable_case, width=width)
+    return on_cases(cases or [], flags.options, work, refuse=refuse, workers=flags.workers, out=flags.out)
+
+
+def verify(path: Path) -> int:
+    """Say whether a proof.json follows from its certificates; the exit code."""
+    checked = check_proof(path)
+    for text in checked.objections:
+        print_error(f"{path}: {text}")
+    bounds = f"bounds on {checked.claims.count} number{'s' * (checked.claims.count != 1)}"
+    if checked.objections:
+        objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
+        print(f"rejected: {escaped(str(path))} ({objections}, {bounds})")
+        return CHECK_FAILED
+    unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+    print(f"accepted: {escaped(str(path))} ({bounds} follow from their certificates{unfinished})")
+    print("note: parameters are labels; the bounds are of the matrices and rates that the certificates state")
+    return 0

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from fpsolve.commands.errors import print_error
-from fpsolve.commands.options import ALL_OPTIONS, NOT_CONVERGED, Cases, Fresh, Reporting
-from fpsolve.signals import INTERRUPTED
+from fpsolve.case.case import Case
+from fpsolve.commands.cases import refuse_no_numbers, run_case
+from fpsolve.commands.errors import NOT_CONVERGED
+from fpsolve.commands.options import FLAGS, Cases, Done, Flags, Fresh, on_cases
+from fpsolve.pool import Pool
+from fpsolve.results.csv_json import summary_line
+from fpsolve.tell.notes import left_out
+from fpsolve.tell.solved import done_of, known_of
+from fpsolve.tell.terminal import print_blocks
 
 
 def run(
@@ -20,7 +26,7 @@ def run(
     json: bool = False,
     everything: Annotated[bool, Parameter(name="--all")] = False,
     table: bool = False,
-    options: Reporting = ALL_OPTIONS,
+    flags: Flags = FLAGS,
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
 
@@ -39,34 +45,19 @@ def run(
         everything: Compute everything, as quantities = "all" in [output].
         table: Print every number of up to ten curves, also Λ(p) at more than 12 p.
     """
-    from fpsolve.commands.cases import run_case
-    from fpsolve.results.tables import whole_summary
-    from fpsolve.solve.simulate import refuse_obstacles
-    from fpsolve.tell.notes import left_out
-    from fpsolve.tell.solved import done_of, known_of
-    from fpsolve.tell.terminal import print_blocks
 
-    code = 0
-    loaded = options.load(cases, {"--all": 'output.quantities="all"'} if everything else {})
-    if monte_carlo:
-        for case in loaded:
-            refuse_obstacles(case)
-    pool = options.pool(loaded)
-    for case in loaded:
-        watch = replace(options.watch(is_json=json), is_whole=table)
-        outcome = run_case(case, options.out, pool=pool, watch=watch, monte_carlo=monte_carlo, is_fresh=fresh)
+    def work(case: Case, pool: Pool) -> Done:
+        watch = flags.watch(is_json=json, is_whole=table)
+        outcome = run_case(case, flags.out, pool=pool, watch=watch, monte_carlo=monte_carlo, is_fresh=fresh)
         sweep, interruption = outcome.sweep, outcome.simulations.interruption
-        if interruption:
-            print_error(interruption)
-        if not (options.quiet or interruption):
+        if not (flags.options.quiet or interruption):
             print_blocks(left_out(case, monte_carlo=monte_carlo))
         if json:
-            print(whole_summary(case, sweep.results, sweep.facts))
-        else:
-            what = done_of(case, len(sweep.results), sweep.failed)
-            options.print_written(case, what, sweep.facts["wall_seconds"], known_of(case, sweep.known))
-        if interruption:
-            return INTERRUPTED
-        if sweep.fails:
-            code = NOT_CONVERGED
-    return code
+            print(summary_line(sweep.results, sweep.facts))
+        what = "" if json else done_of(case, len(sweep.results), sweep.failed)
+        code = NOT_CONVERGED if sweep.failed or sweep.is_empty else 0
+        return Done(what, code, known_of(case, sweep.known), interruption)
+
+    typed = {"--all": 'output.quantities="all"'} if everything else {}
+    refuse = partial(refuse_no_numbers, monte_carlo=monte_carlo)
+    return on_cases(cases, flags.options, work, typed=typed, refuse=refuse, workers=flags.workers, out=flags.out)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fpsolve.case.schema import schema_text
+
 
 def schema() -> int:
     """Print the JSON Schema of case files, with which editors complete and check them.
@@ -10,7 +12,5 @@ def schema() -> int:
 
     Example: fpsolve schema > fpsolve.schema.json
     """
-    from fpsolve.case.schema import schema_text
-
     print(schema_text(), end="")
     return 0

@@ -8,18 +8,14 @@ from datetime import UTC, datetime
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from time import monotonic
-from typing import Any
 
 from fpsolve.case.case import Case
-from fpsolve.commands.errors import print_error
 from fpsolve.commands.interrupts import AGAIN, kept, of_curves, saying_if_interrupted
-from fpsolve.commands.options import ALL_OPTIONS, Cases, Count, Fresh, Reporting
+from fpsolve.commands.options import FLAGS, Cases, Count, Done, Flags, Fresh, on_cases
 from fpsolve.files import writable
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.results.folders import SIMULATED, own_folder
+from fpsolve.results.folders import own_folder
 from fpsolve.results.simulate import SIMULATION, write_simulation
-from fpsolve.signals import INTERRUPTED
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.solve.question import idle
 from fpsolve.solve.records import Records, answered
@@ -55,6 +51,11 @@ class Simulations:
     interruption: str = ""
     known: int = 0
 
+    @property
+    def whole(self) -> int:
+        """How many curves are simulated to their end."""
+        return sum(not each.interrupted for each in self.simulated)
+
     def run(
         self, folder: Path, pool: Pool, watch: Watch, results: Sequence[CurveResult] = (), *, is_fresh: bool
     ) -> None:
@@ -67,14 +68,20 @@ class Simulations:
             is_fresh: whether to do all of them again.
         """
         case, is_elsewhere = self.case, pool.is_elsewhere
-        asked: dict[str, Any] = {"orders": case.simulated.tolist(), "setting": case.monte_carlo}
-        how: dict[str, Any] = {"kind": form_of_record(), "key": partial(simulation_key, **asked), "keeps": is_finished}
+        orders, setting = case.simulated.tolist(), case.monte_carlo
         work = Phase(case.name, "simulation", sum(map(simulation_steps, case.curves())), PERCENT)
         with watch.bar(work) as progress, writable(folder), pool if is_elsewhere else SERIAL as workers:
-            records = Records(folder / RECORDS, is_fresh=is_fresh)
-            task = partial(simulation_of, **asked, progress=idle if is_elsewhere else progress)
+            found_of = answered(
+                Records(folder / RECORDS, is_fresh=is_fresh),
+                workers,
+                partial(simulation_of, orders=orders, setting=setting, progress=idle if is_elsewhere else progress),
+                case.curves(),
+                kind=form_of_record(),
+                key=partial(simulation_key, orders=orders, setting=setting),
+                keeps=is_finished,
+            )
             try:
-                for curve, found, is_known in answered(records, workers, task, case.curves(), **how):
+                for curve, found, is_known in found_of:
                     if is_elsewhere or is_known:
                         progress(simulation_steps(curve), known=is_known)
                     self.known += is_known
@@ -86,9 +93,8 @@ class Simulations:
             except KeyboardInterrupt:
                 if len(self.simulated) in (0, case.planned):  # nothing is found, or all, but not written
                     raise
-        whole = len(self.simulated) - self.simulated[-1].interrupted
-        if whole < case.planned:
-            place = f"in the simulation of curve {whole + 1} of {case.planned}"
+        if self.whole < case.planned:
+            place = f"in the simulation of curve {self.whole + 1} of {case.planned}"
             self.interruption = f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
         watch.shown(show(case, self.simulated, results))
         watch.noted(notes(case, self.simulated, MONTE_CARLO))
@@ -118,15 +124,17 @@ def simulate_case(
         KeyboardInterrupt: nothing was done yet, which its text says.
     """
     refuse_obstacles(case)
-    simulations, started = Simulations(case), datetime.now(UTC)
+    folder, simulations, started = Path(out) / case.name, Simulations(case), datetime.now(UTC)
     with (
-        own_folder(case, out, (SIMULATED,)) as folder,
+        own_folder(folder, "simulate", case=case),
         saying_if_interrupted(lambda: kept(len(simulations.simulated), of_curves(case), folder)),
     ):
         simulations.run(folder, pool, watch, is_fresh=is_fresh)
-        simulated, is_whole = simulations.simulated, not simulations.interruption
-        blocks = chain(show(case, simulated), notes(case, simulated, MONTE_CARLO))
-        write_report(case, folder, watch, blocks, started=started, files=SIMULATION, complete=is_whole)
+        blocks = chain(show(case, simulations.simulated), notes(case, simulations.simulated, MONTE_CARLO))
+        is_whole = not simulations.interruption
+        write_report(
+            case, folder, watch, blocks, started=started, files=SIMULATION, complete=is_whole, name="monte_carlo.html"
+        )
     return simulations
 
 
@@ -138,7 +146,7 @@ def simulate(
     seed: Count | None = None,
     estimator: str | None = None,
     fresh: Fresh = False,
-    options: Reporting = ALL_OPTIONS,
+    flags: Flags = FLAGS,
 ) -> int:
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 
@@ -160,17 +168,12 @@ def simulate(
         for name, value in stated.items()
         if value is not None
     }
-    loaded = options.load(cases, typed)
-    for case in loaded:
-        refuse_obstacles(case)
-    pool = options.pool()
-    for case in loaded:
-        start = monotonic()
-        outcome = simulate_case(case, options.out, pool=pool, is_fresh=fresh, watch=options.watch())
-        if outcome.interruption:
-            print_error(outcome.interruption)
-        what = done_of(case, sum(not each.interrupted for each in outcome.simulated))
-        options.print_written(case, what, monotonic() - start, known_of(case, outcome.known))
-        if outcome.interruption:
-            return INTERRUPTED
-    return 0
+
+    def work(case: Case, pool: Pool) -> Done:
+        found = simulate_case(case, flags.out, pool=pool, is_fresh=fresh, watch=flags.watch())
+        what = done_of(case, found.whole)
+        return Done(what, known=known_of(case, found.known), interruption=found.interruption)
+
+    return on_cases(
+        cases, flags.options, work, typed=typed, refuse=refuse_obstacles, workers=flags.workers, out=flags.out
+    )

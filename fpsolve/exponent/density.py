@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray, Matrix
+from fpsolve.arrays import FloatArray, Matrix, ReadOnly
 from fpsolve.budget import unless_over_budget
 from fpsolve.data import Quantity
 from fpsolve.drawing import QUARTERS, draw_colours, label_axes
@@ -89,7 +89,7 @@ class Fields(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Grid(ReadOnly):
     """Nodes of two coordinates, and the weights of ∫ f dfirst dsecond: phase and noise, if it is no `DirectionGrid`.
 
     Attributes:

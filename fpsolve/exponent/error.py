@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.data import Quantity, Result, brief, dataset
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.axis import ModeEffects, along
@@ -125,7 +125,7 @@ class Moment(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class InvariantClass:
+class InvariantClass(ReadOnly):
     """The growth of a block of variables, or on a ray that the phase never leaves, or of the distance from it.
 
     Attributes:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_array, real_numbers
+from fpsolve.arrays import FloatArray, read_only, real_array, real_numbers, require
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.curve import Values, values
@@ -76,13 +77,14 @@ class MomentLyapunovFunction(Result):
         budget: Budget | None = None,
         solver: ExponentSolver | None = None,
     ) -> None:
+        require(interval, Iterable, "interval", "the least and the largest p, such as (-1.0, 4.0)")
         self.solver = solver or solver_of(problem, mesh, rtol, budget)
         low, high = (float(end) for end in checked_moments(list(interval), self.solver.method))
         if not low < high:
             raise ValueError(f"the interval of p is {interval}; its ends must increase")
         self.interval = low, high
         self._curves = self.solver.curves(low, high, MOST_PARTS)
-        self.nodes = np.unique([p for curve in self._curves for p in curve.nodes])
+        self.nodes = read_only(np.unique([p for curve in self._curves for p in curve.nodes]))
         at = self._values(self.nodes)
         if obstacle := broken_convexity(self.nodes, at.value, at.derivative, at.error, lambda: at.derivative_error):
             raise NotConverged(obstacle, remedy=self.solver.method.refinement)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
 from numbers import Real
-from types import UnionType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fpsolve.arrays import FloatArray, real_number, real_numbers, shown
+from fpsolve.arrays import FloatArray, read_only, real_number, real_numbers, require, shown
 from fpsolve.budget import Meter, OverBudget, begin, unless_over_budget
 from fpsolve.data import Result, dataset
 from fpsolve.errors import NoSuchExponent, NotConverged
@@ -51,12 +50,6 @@ FEW_MOMENTS = 16
 SLOPE_SHARE = 1e-3
 """Of what a tangent rises, by which it may lie too high, as slopes have errors."""
 
-_KINDS: Sequence[tuple[str, type | UnionType, str]] = (
-    ("mesh", CylinderMesh | None, "a CylinderMesh, or None"),
-    ("budget", Budget, "a Budget"),
-    ("rtol", Real, "a number such as 1e-8"),
-)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MomentLyapunov(Result):
@@ -89,6 +82,7 @@ class MomentLyapunov(Result):
     def __post_init__(self) -> None:
         least = 0.5 * np.spacing(np.abs(self.value))
         object.__setattr__(self, "error_estimate", np.maximum(self.error_estimate, least))
+        super().__post_init__()
 
     @cached_property
     def warnings(self) -> tuple[Message, ...]:
@@ -114,7 +108,7 @@ class MomentLyapunov(Result):
     def derivative(self) -> FloatArray:
         """Λ′(p), shape (n,): `slope`, and what is solved now where that is NaN; NaN where there is none."""
         known = zip(self.p.tolist(), self.slope.tolist(), strict=True)
-        return np.array([self.solver.slope(p) if p and math.isnan(slope) else slope for p, slope in known])
+        return read_only(np.array([self.solver.slope(p) if p and math.isnan(slope) else slope for p, slope in known]))
 
     @property
     def derivative_error(self) -> FloatArray:
@@ -195,9 +189,9 @@ class ExponentSolver:
 
     def __post_init__(self) -> None:
         checked_problem(self.problem)
-        for name, kind, words in _KINDS:
-            if not isinstance(getattr(self, name), kind) or getattr(self, name) is True:
-                raise TypeError(f"got {name} = {shown(getattr(self, name))}; must be {words}")
+        require(self.mesh, CylinderMesh | None, "mesh", "a CylinderMesh, or None")
+        require(self.budget, Budget, "budget", "a Budget")
+        require(self.rtol, Real, "rtol", "a number such as 1e-8")
         if not (self.problem.noise.is_white or math.isfinite(self.problem.noise.standard_deviation)):
             raise NoSuchExponent(Message(Code.INFINITE_VARIANCE))
         if not (math.isfinite(self.rtol) and RTOLS["gt"] < self.rtol < RTOLS["lt"]):

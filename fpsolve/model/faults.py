@@ -1,4 +1,4 @@
-"""What a field accepts, and what is wrong with parameters: sentences read off types and ranges, not pydantic's."""
+"""What a field accepts, and what is wrong with a value: sentences read off types and ranges, not pydantic's."""
 
 from __future__ import annotations
 
@@ -6,22 +6,31 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict, is_dataclass
+from difflib import get_close_matches
+from enum import Enum
 from fractions import Fraction
 from functools import wraps
-from itertools import chain
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, cast, dataclass_transform, get_args, get_origin
 
-from pydantic import Field, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import BaseModel, Field, ValidationError
+from pydantic.dataclasses import dataclass, is_pydantic_dataclass
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
-from fpsolve.arrays import shown
-from fpsolve.model.parameters import STRICT, meaning_of, without_unit
+from fpsolve.arrays import shortened
+from fpsolve.messages import is_control
+from fpsolve.model.parameters import STRICT, Parametrised, example_of, meaning_of, without_unit
 
 Kind = TypeVar("Kind")
-_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string", bool: "boolean"}
+_KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
+MISSING = "missing"
+"""The first word about what is missing."""
+_TELL_KIND = ("_type", "_not_found", "_tag_invalid", "_instance_of")
+"""Endings of pydantic's errors of which it matters what a value is."""
 
 
 class ParameterError(ValidationError):
@@ -82,36 +91,100 @@ def _in_words(error: ValidationError, kind: Any) -> ParameterError:
     return told
 
 
-def _sentence(detail: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
+def _sentence(detail: ErrorDetails, fields: Mapping[str, FieldInfo]) -> str:
     if detail["type"] == "value_error":
         return str(detail["ctx"]["error"])
     place = detail["loc"][0]
-    name = dict(enumerate(fields)).get(place, place)
+    name = list(fields)[place] if isinstance(place, int) and place < len(fields) else place
     if name not in fields:
         what = f"argument {name + 1}" if isinstance(name, int) else name
         return f"{what}: unknown; the parameters are {', '.join(fields)}"
-    meaning = meaning_of(fields[name])
-    must = f"must be {accepted(fields[name])}" + (f" ({meaning})" if meaning else "")
-    found = "missing" if detail["type"] == "missing" else f"got {shown(detail['input'])}"
-    return f"{name}: {found}; {must}{without_unit(detail['input'])}"
+    return f"{name}: {sentence(detail, fields[str(name)])}"
+
+
+def sentence(detail: ErrorDetails, field: FieldInfo) -> str:
+    """What is wrong with a value: "got 0; must be a whole number >= 2 (how many); write, for example, num = 3".
+
+    Args:
+        detail: what pydantic says of it.
+        field: what it must be.
+    """
+    kind, value, meaning, example = detail["type"], detail["input"], meaning_of(field), example_of(field)
+    if kind == "too_long":
+        noun = "entries" if any(type(each) is str for each in value) else "numbers"
+        return f"lists {len(value)} {noun}; must be at most {detail['ctx']['max_length']}; list fewer"
+    must = f"must be {accepted(field)}" + (f" ({meaning})" if meaning else "")
+    if kind == "missing":
+        return f"{MISSING}; {must}" + (f"; add it, for example {example}" if example else "")
+    has_kind = kind.endswith(_TELL_KIND) or (kind == "literal_error" and type(value) is not str)
+    hint = nearest(value, _texts(field.annotation)) + (f" write, for example, {example}" if example else "")
+    remedy = without_unit(value) or (f";{hint}" if hint else "")
+    return f"got {shown_with_kind(value) if has_kind else shown(value)}; {must}{remedy}"
+
+
+def shown(value: object) -> str:
+    """A value as TOML writes it, cut to a readable length."""
+    try:
+        return shortened(_toml(value))
+    except (ValueError, RecursionError):
+        return "a value too long to show"
+
+
+def shown_with_kind(value: object, *, but: type | None = None) -> str:
+    """A value as TOML writes it with what it is, but for one kind: "3 (a number)"."""
+    kind = _KINDS.get(type(value)) or f"a {type(value).__name__}"
+    return shown(value) if type(value) is but else f"{shown(value)} ({kind})"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
+    if type(value) not in (bool, str):
+        return " ".join(str(value).split())
+    return "".join(
+        json.dumps(each)[1:-1] if is_control(each) else each for each in json.dumps(value, ensure_ascii=False)
+    )
+
+
+def nearest(name: object, known: Iterable[str]) -> str:
+    """' did you mean "omega"?' or nothing."""
+    found = guess(name, known) if type(name) is str else None
+    return f' did you mean "{found}"?' if found else ""
+
+
+def guess(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like another; a key without its section finds the key with it."""
+    keys = {key.lower(): key for key in known}
+    name = name.lower()[:60]
+    found = [key for key in keys if key.endswith(f".{name}")] or get_close_matches(name, keys, n=1)
+    return keys[found[0]] if found else None
 
 
 def accepted(field: FieldInfo) -> str:
     """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
-    texts = choices(field.annotation)
-    if texts:
-        return "one of " + ", ".join(f'"{text}"' for text in texts)
-    bounds = (
-        f"{sign} {_number(getattr(constraint, name))}"
-        for constraint in field.metadata
-        for name, sign in _BOUNDS.items()
-        if hasattr(constraint, name)
-    )
-    return f"{_with_article(_not_empty(field.metadata) + _noun(field.annotation))} {' and '.join(bounds)}".rstrip()
+    bounds = " and ".join(f"{_SIGNS[name]} {_number(bound)}" for name, bound in bounds_in(field).items())
+    return f"{_with_article(_not_empty(field.metadata) + _noun(field.annotation))} {bounds}".rstrip()
 
 
-def _not_empty(metadata: Iterable[Any]) -> str:
-    return "non-empty " if any(hasattr(constraint, "min_length") for constraint in metadata) else ""
+def bounds_in(field: FieldInfo) -> dict[str, float]:
+    """The ends of the range of a number, by "ge", "gt", "le" or "lt"."""
+    return {name: bound for name, bound in _limits(field.metadata).items() if name in _SIGNS}
+
+
+def _limits(metadata: Iterable[object]) -> dict[str, Any]:
+    """What the constraints of a field state, by their names, such as "min_length"."""
+    return {
+        name: limit
+        for each in metadata
+        if is_dataclass(each) and not isinstance(each, type)
+        for name, limit in asdict(each).items()
+    }
+
+
+def _not_empty(metadata: Iterable[object]) -> str:
+    return "non-empty " if _limits(metadata).get("min_length") else ""
 
 
 def _number(bound: float) -> str:
@@ -133,19 +206,31 @@ def entry_of(field: FieldInfo) -> FieldInfo:
     return field
 
 
-def choices(annotation: Any) -> list[str]:
+def choices(annotation: object) -> list[str]:
     """The texts that an annotation takes, if these are all."""
     if get_origin(annotation) is Literal:
         return list(get_args(annotation))
-    return [member.value for member in getattr(annotation, "__members__", {}).values()]
+    is_enum = isinstance(annotation, type) and issubclass(annotation, Enum)
+    return [member.value for member in cast("type[Enum]", annotation)] if is_enum else []
 
 
-def fields_of(annotation: Any) -> Mapping[str, FieldInfo]:
+def _texts(annotation: object) -> list[str]:
+    """The texts in an annotation such as `DrawnName | MomentAt`."""
+    return choices(annotation) or [text for each in get_args(annotation) for text in _texts(each)]
+
+
+def fields_of(annotation: object) -> Mapping[str, FieldInfo]:
     """The fields of a model, or of a kind of system or noise, as in a table of a case file; of others nothing."""
-    return {**getattr(annotation, "__pydantic_fields__", {}), **getattr(annotation, "stated", {})}
+    if not isinstance(annotation, type):
+        return {}
+    if issubclass(annotation, Parametrised):
+        return {**annotation.__pydantic_fields__, **annotation.stated}
+    if issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation):
+        return annotation.__pydantic_fields__
+    return {}
 
 
-def table_of(value: Any) -> Mapping[str, Any]:
+def table_of(value: object) -> Mapping[str, object]:
     """A value of a case file that is a table; an empty one where it is none."""
     return value if isinstance(value, dict) else {}
 
@@ -159,6 +244,11 @@ def written_path(path: Iterable[str | int]) -> str:
     return text
 
 
+def quoted(names: Iterable[str]) -> str:
+    """Names as TOML lists them."""
+    return ", ".join(f'"{name}"' for name in names)
+
+
 def _with_article(noun: str) -> str:
     return noun if noun.startswith(('"', "one of")) else f"a {noun}"
 
@@ -169,14 +259,13 @@ def _noun(annotation: Any, plural: str = "") -> str:
         return f"table{plural} with the keys {', '.join(fields)}"
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        inner = chain.from_iterable(getattr(extra, "metadata", ()) for extra in arguments[1:])
+        inner = [each for extra in arguments[1:] if isinstance(extra, FieldInfo) for each in extra.metadata]
         return _not_empty(inner) + _noun(arguments[0], plural)
     if origin in (Union, UnionType):
         first, *others = (_noun(argument, plural) for argument in arguments if argument is not NoneType)
         return " or ".join([first, *(others if plural else map(_with_article, others))])
     if texts := choices(annotation):
-        names = ", ".join(f'"{text}"' for text in texts)
-        return f"{'some' if plural else 'one'} of {names}" if len(texts) > 1 else names
+        return f"{'some' if plural else 'one'} of {quoted(texts)}" if len(texts) > 1 else quoted(texts)
     if origin is tuple:
         return f"list{plural} of {_noun(arguments[0], 's')}"
     if origin is dict:

@@ -100,6 +100,8 @@ def meaning_of(field: FieldInfo) -> str:
 def without_unit(value: Any) -> str:
     """What to write for a text such as "1.0 Hz": "; write 6.283185 for 1.0 Hz, in rad/time"; "" for others."""
     text = value if isinstance(value, str) else ""
+    if re.fullmatch(r"[+-]?\d+,\d+([eE][+-]?\d+)?", text):
+        return f"; write the decimal point as {text.replace(',', '.')}"
     match = re.fullmatch(rf"\s*([-+]?(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?)\s*({'|'.join(UNITS)})\s*", text)
     if match is None:
         return ""

@@ -37,7 +37,7 @@ SECOND_DERIVATIVE = replace(
     latex=r"$\Lambda''(p)$",
 )
 GROWTH = Quantity("growth_rate", "s", "growth rate of a path", r"$s = \ln\|x(t)\|/t$", "1/time")
-RATE_FUNCTION = Quantity(
+RATE_FUNCTION: Quantity = Quantity(
     "rate_function",
     "I(s)",
     "rate function of the growth rate",

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from fpsolve.arrays import real_number
 from fpsolve.errors import NoHierarchy, NotConverged
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
@@ -92,7 +93,7 @@ def prove(
         ValueError: p is not finite, the width not positive, or the speed at a jump has no one sign.
         MissingFlint: python-flint is not installed.
     """
-    return prove_bounds(problem, statement_of(problem), float(p), width, budget or Budget(), progress)
+    return prove_bounds(problem, statement_of(problem), real_number(p, "p"), width, budget or Budget(), progress)
 
 
 def prove_lyapunov_exponent(

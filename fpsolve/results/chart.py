@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.files import write_csv, write_json
-from fpsolve.results.tables import head
+from fpsolve.results.csv_json import head
 from fpsolve.solve.chart import Chart, appears, charted
 
 FILES = "chart.csv", "chart.json"
@@ -23,8 +23,9 @@ def write_chart(case: Case, chart: Chart, folder: Path) -> None:
         for *point, label in zip(branch.x, branch.y, branch.width, branch.labels, strict=True)
     )
     write_csv(folder / "chart.csv", ["line", "branch", "x", "y", "width", "label"], rows)
-    targets, frame = charted(case).lines, {"x": charted(case).x, "y": charted(case).y}
-    keys = [axis.key for axis in frame.values()]
+    section = charted(case)
+    targets, frame = section.lines, {"x": section.x, "y": section.y}
+    keys = section.x.key, section.y.key
     summary = {
         **head(case),
         "complete": chart.complete,

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Curve
 from fpsolve.data import Quantity, dataset
-from fpsolve.exponent.density import Densities, DirectionGrid
+from fpsolve.exponent.density import Densities
 from fpsolve.files import atomic
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.results.nodes import FIELDS
-from fpsolve.results.vtk import Facts, field_data, write_between, write_series
+from fpsolve.results.vtk import facts_of_curve, write_between, write_series
 
 ERROR = Quantity(
     "density_error",
@@ -32,12 +30,6 @@ _DIGITS = str.maketrans("₁₂₃₄²", "12342")
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 
-def on_one_grid(found: Sequence[Densities]) -> list[Densities]:
-    """All on the finest of their grids."""
-    grid = max((each.grid for each in found), key=lambda grid: grid.first.size)
-    return [each.on(grid) for each in found]
-
-
 def directions_file(curve: Curve, folder: Path) -> Path:
     """Where the densities of a curve are."""
     return folder / f"densities{curve.suffix}.nc"
@@ -47,7 +39,7 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
     """Write densities.nc: of every p that is there the fields over directions, and that at p = 0 as the stationary one.
 
     Args:
-        found: on one grid; none is written without one.
+        found: on one grid, one at least.
         curve: whose they are.
         folder: where.
     """
@@ -59,14 +51,14 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
         if not each.pair.p:
             numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.T_adjoint
             numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
-    for name, quantity in FIELDS.items():
-        about = replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)
-        numbers[about] = np.stack([getattr(each.fields, name) for each in shown])
+    fields = np.stack([each.fields for each in shown], axis=1)
+    for (name, quantity), values in zip(FIELDS.items(), fields, strict=True):
+        numbers[replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)] = values
     numbers[ERROR] = np.array([each.error for each in shown])
     numbers[MOMENT] = np.array([each.value for each in shown])
-    for mean in grid.means(shown[0].fields.tilted_density):
-        values = [grid.means(each.fields.tilted_density)[mean] for each in shown]
-        numbers[replace(mean, dims=("p",))] = np.array(values)
+    means = [grid.means(each.fields.tilted_density) for each in shown]
+    for mean in means[0]:
+        numbers[replace(mean, dims=("p",))] = np.array([each[mean] for each in means])
     places = {P: np.array([each.pair.p for each in shown]), **grid.coordinates}
     if grid.share:
         places[grid.share] = np.sin(grid.first) ** 2
@@ -84,37 +76,29 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     T jumps from one edge to the other, and of three variables the unit sphere. At p = 0
     T = 1 and T* is the stationary density, so that the series leaves it out.
     """
-    found = on_one_grid(found)
+    if not found:
+        return
+    grid = max((each.grid for each in found), key=lambda grid: grid.first.size)
+    found = [each.on(grid) for each in found]
     write_densities(found, curve, folder)
-    grid, problem = found[0].grid, curve.problem
-    facts = {"curve": float(curve.number), **field_data(curve.parameters, curve.varied, problem)}
-    facts |= {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
-    stationary, others = [each for each in found if not each.pair.p], [each for each in found if each.pair.p]
+    along = {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    facts = {**facts_of_curve(curve), **along}
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
-    always = dict[str, FloatArray]()
-    for each in stationary:
-        always["stationary_density"] = each.fields.T_adjoint
+    places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
+    stationary = [each.fields.T_adjoint for each in found if not each.pair.p]
+    always = {"stationary_density": stationary[0]} if stationary else {}
     always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
     if stationary and curve.number == 1:
-        _write_plane(folder / "density.vtu", grid, always, {"p": 0.0, "Lambda": 0.0, **facts})
+        write_between(folder / "density.vtu", places, always, {"p": 0.0, "Lambda": 0.0, **facts})
 
     def write(path: Path, each: Densities) -> None:
         data = dict(reversed(each.fields._asdict().items()))
-        _write_plane(path, grid, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
+        write_between(path, places, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
 
-    if others:
-        write_series(
-            folder, f"eigenfunctions{curve.suffix}", {each.pair.p: partial(write, each=each) for each in others}
-        )
+    if others := {each.pair.p: each for each in found if each.pair.p}:
+        write_series(folder, f"eigenfunctions{curve.suffix}", others, write)
 
 
 def _plain(axis: Quantity) -> str:
     """The words of a coordinate and its unit, in ASCII."""
     return f"{axis.words} ({axis.unit})".translate(_DIGITS).encode("ascii", "replace").decode()
-
-
-def _write_plane(path: Path, grid: DirectionGrid, data: Mapping[str, FloatArray], facts: Facts) -> None:
-    """Write a .vtu file of quadrilaterals between the nodes; the first array of point data is shown first."""
-    first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
-    places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
-    write_between(path, places, data, facts)

@@ -9,8 +9,7 @@ Field data are numbers, as meshio refuses texts: a text is the codes of its lett
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -19,9 +18,12 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.exponent.density import xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
+from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.files import write_text
+from fpsolve.results.directions import write_directions
 from fpsolve.results.nodes import Nodes
 from fpsolve.results.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
 from fpsolve.solve.eigenfunctions import Eigenfunctions
@@ -78,7 +80,7 @@ def write_eigenfunctions(
         data = {**grid.fields(pair)._asdict(), "stationary_density": density, "z": grid.z}
         _write_grid(path, grid, data, {"p": pair.p, "Lambda": pair.value, **facts})
 
-    return write_series(directory, stem, {pair.p: partial(write, pair=pair) for pair in pairs})
+    return write_series(directory, stem, {pair.p: pair for pair in pairs}, write)
 
 
 def write_density(
@@ -106,6 +108,13 @@ def write_density(
     return path
 
 
+FILES: Mapping[str, Callable[..., None]] = {
+    EIGENFUNCTIONS: write_pictures,
+    DIRECTIONS.part: write_directions,
+}
+"""Each writes what was found of a curve, and no record holds, into a folder, by the names of questions."""
+
+
 def write_curves(case: Case, folder: Path) -> None:
     """Write `curves.pvd`, a time series over the curves of which there are eigenfunctions in a folder, all at one p.
 
@@ -118,10 +127,13 @@ def write_curves(case: Case, folder: Path) -> None:
     if case.planned == 1 or not there:
         return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
-    if len(keys) == 1 and not case.vary.is_text(keys[0]):
-        entries = [(float(curve.varied[keys[0]]), name, f"{curve.label}, p = {p:g}") for curve, name in there]
-    else:
-        entries = [(float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}") for each, name in there]
+    is_number = len(keys) == 1 and not case.vary.is_text(keys[0])
+    entries = [
+        (float(each.varied[keys[0]]), name, f"{each.label}, p = {p:g}")
+        if is_number
+        else (float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}")
+        for each, name in there
+    ]
     write_text(folder / CURVES, collection_of(sorted(entries)))
 
 

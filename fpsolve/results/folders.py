@@ -1,70 +1,94 @@
-"""The folder of a case: one run at a time writes there, and all in it is of the parameters of the case."""
+"""The folder of results: one run at a time writes there, and all that fpsolve wrote there is of one case.
+
+A list in the folder says for which parameters it is, and which command wrote which file. No other file is removed.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.errors import OutputError, Remedy
-from fpsolve.files import TEMPORARY, alone, writable, write_text
-from fpsolve.results.tables import TABLES
-from fpsolve.solve.questions import QUESTIONS
+from fpsolve.files import alone, announced, draft_of, writable, write_text
 
-SOLVED = "|".join([*map(re.escape, TABLES), r"figure\.(png|pdf)", *(each.names for each in QUESTIONS if each.names)])
-SIMULATED = r"monte_carlo(-\d+)?\.json|monte_carlo_response(-\d+)?\.(csv|vti|png|pdf)"
-REPORT = r"report\.html"
-"""Pattern of the name of the report of what was done last, which whatever is done next makes stale."""
-CHART, PROVEN, DESIGNED = r"chart\.(csv|json|png|pdf)", r"proof\.json", r"design\.(json|toml)"
-"""Patterns of the names of the files that a run writes, a simulation, a chart, proofs, and a design."""
+LIST = "records/files.txt"
+"""The list: a digest of the parameters, then a line for each file, with the command that wrote it."""
+_LINE = re.compile(r"^(\w+) ((?:\w[\w.+-]*/)?\w[\w.+-]*)\n", re.MULTILINE)
+"""A whole line of a file in the folder, or in a folder there."""
 _FOLDERS = r"records|eigenfunctions(-\d+)?"
-_UNFINISHED = rf"(({_FOLDERS})/)?{TEMPORARY}"
-_PARAMETERS = "records/parameters"
-"""The file that tells of which parameter sets all others are."""
 
 
 @contextmanager
-def own_folder(case: Case, out: str | Path, replaced: Sequence[str]) -> Iterator[Path]:
-    """The folder of a case for one run alone. Files that match `replaced` are removed, of other parameters all.
+def own_folder(
+    folder: Path, *commands: str, case: Case | None = None
+) -> Iterator[Callable[[str], AbstractContextManager[None]]]:
+    """A folder for one run alone, that keeps the list of what is written in the body.
+
+    What the commands wrote the last time is removed first, and what is there of other parameters. A name is in the list
+    before its file is there, so that the next run knows what a killed one has left. Files are of the first command, but
+    in a body for which what is yielded names another one.
+
+    Args:
+        commands: of this run.
+        case: whose parameters count; those of no case are always the same.
 
     Raises:
         OutputError: the folder cannot be made or written to, another run writes into it, or something in it has the
             name of what will be written and cannot be replaced; nothing is removed.
     """
-    folder = Path(out) / case.name
+    sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns]) if case else ""
+    digest = sha256(sets.encode()).hexdigest()
     with alone(folder):
         with writable(folder):
-            there = {path.relative_to(folder).as_posix(): path for path in _entries(folder)}
-            for name, path in there.items():
-                is_folder = path.is_dir() and not path.is_symlink()
-                if re.fullmatch(_FOLDERS, name) and not is_folder:
+            for path in folder.iterdir():
+                if re.fullmatch(_FOLDERS, path.name) and (path.is_symlink() or not path.is_dir()):
                     raise OutputError(f"{path} cannot be written to: it is no folder, or a link to one", Remedy.FOLDER)
-                if re.fullmatch("|".join([*replaced, REPORT]), name) and is_folder:
-                    raise OutputError(f"{path} cannot be written: Is a directory", Remedy.FOLDER)
-            sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns])
-            parameters, stated, is_same = sha256(sets.encode()).hexdigest(), folder / _PARAMETERS, False
+            former, names = _read(folder)
+            for name, owner in names.items():
+                if owner in commands and _is_folder(folder / name):
+                    raise OutputError(f"{folder / name} cannot be written: Is a directory", Remedy.FOLDER)
+            known = {name: owner for name, owner in names.items() if owner not in commands and former == digest}
+            _remove(folder, names.keys() - known.keys())
+            write_text(folder / LIST, "\n".join([digest, *(f"{owner} {name}" for name, owner in known.items()), ""]))
+
+        def add(command: str, path: Path) -> None:
+            name = path.relative_to(folder).as_posix() if path.is_relative_to(folder) else ""
+            if name and known.get(name) != command:
+                known[name] = command
+                with (folder / LIST).open("a", encoding="utf-8") as file:
+                    file.write(f"{command} {name}\n")
+
+        def files_of(command: str) -> AbstractContextManager[None]:
+            return announced(partial(add, command))
+
+        with files_of(commands[0]):
+            yield files_of
+
+
+def _read(folder: Path) -> tuple[str, dict[str, str]]:
+    """The digest of the parameters, and the commands by the names of their files; nothing where the list is none."""
+    path = folder / LIST
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    digest, _, lines = text.partition("\n")
+    return digest, {name: command for command, name in _LINE.findall(lines)}
+
+
+def _remove(folder: Path, names: Iterable[str]) -> None:
+    """Remove files, what is left unfinished of them, and their folders if these are empty then."""
+    for path in (folder / name for name in names):
+        for each in (path, draft_of(path)):
+            if not _is_folder(each):
+                each.unlink(missing_ok=True)
+        if path.parent != folder:
             with suppress(OSError):
-                is_long = stated.is_file() and stated.stat().st_size == len(parameters)
-                is_same = is_long and stated.read_bytes() == parameters.encode()
-            kinds = replaced if is_same else (SOLVED, SIMULATED, CHART, PROVEN, DESIGNED)
-            names = "|".join([*kinds, REPORT, _UNFINISHED])
-            for name, path in there.items():
-                if re.fullmatch(names, name) and (path.is_symlink() or not path.is_dir()):
-                    path.unlink()
-                    if path.parent != folder and not any(path.parent.iterdir()):
-                        path.parent.rmdir()
-            write_text(stated, parameters)
-        yield folder
+                path.parent.rmdir()
 
 
-def _entries(folder: Path) -> Iterator[Path]:
-    """What is in a folder, and in the folders in it; what links lead to is not."""
-    for path in sorted(folder.iterdir()):
-        yield path
-        if path.is_dir() and not path.is_symlink():
-            with suppress(PermissionError):  # somebody else's
-                yield from sorted(path.iterdir())
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from types import GenericAlias
 from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.model.quantity import STATUS
-from fpsolve.results.beyond import says_more
-from fpsolve.results.columns import row_of, table_of
+from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.discretisation import QUESTION as DISCRETISATION
 from fpsolve.solve.discretisation import largest_of
 from fpsolve.solve.moments import QUESTION as MOMENTS
-from fpsolve.solve.question import Asked, Entry, Job, Limit, Numerics, Reason
+from fpsolve.solve.question import Asked, Job, Numerics
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records, key_of, made, plain
 from fpsolve.solve.sets import everything, result_of
@@ -25,16 +23,7 @@ from fpsolve.solve.sets import everything, result_of
 KEPT = 100
 """So many results stay in memory, as of few curves all are asked for again."""
 ROW = "row"
-"""What the entries of Λ(p) are called, before their p."""
-_LARGEST = tuple[float, dict[str, Any]]
-"""The form of the p of the largest size in a record, and of what it was solved on."""
-_ROW = tuple[tuple[float, ...], Limit | None]
-"""The form of Λ(p) in a record, see `Job.rows`, and of the budget in which it was found."""
-
-
-def form_of(name: str) -> Any:
-    """The form of an `Entry` of a question in a record."""
-    return GenericAlias(tuple, (BY_NAME[name].kind | None, Reason | None, float, Limit | None))
+"""What the entries of Λ(p) are called, before their p: a row of `Job.rows`, and the budget in which it was found."""
 
 
 def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
@@ -44,37 +33,36 @@ def names_of(asked: Asked, numerics: Numerics) -> dict[str, str]:
     """
     solver = numerics.rtol, numerics.mesh and vars(numerics.mesh)
     of_row = {name: each for name, each in asked[MOMENTS.name].items() if name != "p"}
-    names = {name: key_of(each, *solver) for name, each in asked.items()}
-    return {name: f"{name}-{key[:16]}" for name, key in (names | {ROW: key_of(of_row, *solver)}).items()}
+    return {name: f"{name}-{key_of(each, *solver)[:16]}" for name, each in {**asked, ROW: of_row}.items()}
 
 
 def record_of(job: Job) -> Entries:
     """The entries of what was solved now of a set, and of each p."""
     names = names_of(job.asked, job.numerics)
-    record = Entries()
-    for name, each in job.new.items():
-        record[names[name]] = plain(form_of(name), (each.found, each.reason, each.seconds, each.limit))
-    if MOMENTS.name in job.new or MOMENTS.name not in job.entries:
-        limit = job.new[MOMENTS.name].limit if MOMENTS.name in job.new else job.numerics.limit
-        known = ((p, job.rows[p]) for p in job.asked[MOMENTS.name]["p"] if p in job.rows)
-        record |= {f"{names[ROW]} {p!r}": plain(_ROW, (row, limit)) for p, row in known}
+    record = Entries({names[name]: plain(BY_NAME[name].entry, each) for name, each in job.new.items()})
+    moments = job.new.get(MOMENTS.name)
+    if moments or MOMENTS.name not in job.entries:
+        limit = moments.limit if moments else job.numerics.limit
+        asked = job.asked[MOMENTS.name]["p"]
+        record |= {f"{names[ROW]} {p!r}": (job.rows[p], limit) for p in asked if p in job.rows}
     if record and DISCRETISATION.name not in job.entries and "solver" in vars(job) and (largest := largest_of(job)):
-        record[f"{names[MOMENTS.name]} largest"] = plain(_LARGEST, largest)
+        record[f"{names[MOMENTS.name]} largest"] = largest
     return record
 
 
 def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bool = False) -> Job:
     """Give a job what its record has of what is asked: what is settled, or all; what cannot be read is not there."""
     for name in job.asked:
-        with suppress(ValueError, KeyError, TypeError):
-            entry = Entry(*made(form_of(name), record[names[name]]))
+        with suppress(ValueError, KeyError):
+            entry = made(BY_NAME[name].entry, record[names[name]])
             if is_all or job.numerics.settles(entry.limit):
                 job.entries[name] = entry
     with suppress(ValueError, KeyError):
-        job.largest = made(_LARGEST, record[f"{names[MOMENTS.name]} largest"])
+        p, facts = record[f"{names[MOMENTS.name]} largest"]
+        job.largest = p, facts
     for p in job.asked[MOMENTS.name]["p"]:
-        with suppress(ValueError, KeyError, TypeError):
-            row, limit = made(_ROW, record[f"{names[ROW]} {p!r}"])
+        with suppress(ValueError, KeyError):
+            row, limit = record[f"{names[ROW]} {p!r}"]
             if is_all or job.numerics.settles(limit):
                 job.rows[p] = row
     return job
@@ -88,27 +76,24 @@ class Results(Sequence[CurveResult]):
         records: those of its folder.
 
     Attributes:
+        case: the same.
         asked: what is asked of the first curve, and of each other one.
-        table: the numbers of all that are known.
-        says: whether anything is said of a curve beyond its numbers, shape (curves,).
+        table: the numbers and messages of all that are known.
         whole: the numbers of the curves of which all is known that is asked for.
     """
 
     def __init__(self, case: Case, records: Records) -> None:
-        self._case, self._records, self._numerics = case, records, Numerics.of(case)
+        self.case, self._records, self._numerics = case, records, Numerics.of(case)
         self.asked = everything(case, 1), everything(case, 2)
         self._names = [names_of(each, self._numerics) for each in self.asked]
-        self.table, self.says = table_of(case), np.ones(case.planned, dtype=bool)
-        self.whole = set[int]()
+        self.table, self.whole = Table(case), set[int]()
         self._kept: dict[int, CurveResult] = {}
-        for job in self._jobs():
-            if job.is_whole:
-                self.add(job)
+        self.read()
 
     def job(self, number: int, *, is_all: bool = False) -> Job:
         """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
-        vary, place = self._case.vary, number > 1
-        curve = Curve(self._case.problem, vary.sets[number - 1], number)
+        vary, place = self.case.vary, number > 1
+        curve = Curve(self.case.problem, vary.sets[number - 1], number)
         job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
         return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
 
@@ -119,8 +104,7 @@ class Results(Sequence[CurveResult]):
             self.whole.add(number)
         if number <= KEPT:
             self._kept[number] = result
-        self.table.put(number - 1, row_of(self._case, result))
-        self.says[number - 1] = says_more(self._case, result)
+        self.table.put(result)
         return result
 
     def put(self, curve: Curve, record: Entries) -> CurveResult:
@@ -128,34 +112,27 @@ class Results(Sequence[CurveResult]):
         self._records.put(curve.digest, record)
         return self.add(self.job(curve.number, is_all=True))
 
-    def add_rest(self) -> None:
-        """Take in what is known of the sets that are not finished."""
-        for job in self._jobs(is_all=True):
-            if job.entries or job.rows:
+    def read(self, *, is_all: bool = False) -> None:
+        """Take in what records hold of the sets that are finished, or of all."""
+        left = {*range(1, self.case.planned + 1)}.difference(self.numbers) if self._records else ()
+        for number in sorted(left):
+            job = self.job(number, is_all=is_all)
+            if job.is_whole or (is_all and (job.entries or job.rows)):
                 self.add(job)
-
-    def _jobs(self, *, is_all: bool = False) -> Iterator[Job]:
-        left = {*range(1, self._case.planned + 1)}.difference(self.numbers) if self._records else ()
-        return (self.job(number, is_all=is_all) for number in sorted(left))
-
-    @property
-    def telling(self) -> Iterator[CurveResult]:
-        """Those of which more is said than their numbers."""
-        return (self.of(number) for number in self.numbers if self.says[number - 1])
-
-    def of(self, number: int) -> CurveResult:
-        """That of the curve with a number."""
-        return self._kept.get(number) or result_of(self.job(number, is_all=True))
-
-    @property
-    def places(self) -> list[int]:
-        """Those in the table of the curves of which anything is known."""
-        return np.flatnonzero(np.isfinite(self.table[STATUS.name].values)).tolist()
 
     @property
     def numbers(self) -> list[int]:
         """Those of the curves of which anything is known."""
-        return [place + 1 for place in self.places]
+        return (1 + np.flatnonzero(np.isfinite(self.table[STATUS.name].values))).tolist()
+
+    @property
+    def telling(self) -> Iterator[CurveResult]:
+        """Those of which something is said."""
+        return (self.of(number) for number in self.numbers if self.table.messages[number - 1])
+
+    def of(self, number: int) -> CurveResult:
+        """That of the curve with a number."""
+        return self._kept.get(number) or result_of(self.job(number, is_all=True))
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -165,4 +142,4 @@ class Results(Sequence[CurveResult]):
 
     def __getitem__(self, index: Any) -> Any:
         numbers = self.numbers[index]
-        return [*map(self.of, numbers)] if isinstance(numbers, list) else self.of(numbers)
+        return [*map(self.of, numbers)] if isinstance(index, slice) else self.of(numbers)

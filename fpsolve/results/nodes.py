@@ -11,16 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.exponent.density import Fields, own_phases, plane_fields, refuse_more, xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.fem.noise_axes import LineAxis, Samples
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import Quantity
+from fpsolve.results.vtk import nodes_of_quadrilateral
 
 MAX_ORDER = 4
 """Largest degree of the quadrilaterals; elements of a higher degree are cut into several of them."""
@@ -44,14 +45,14 @@ class Nodes:
 
     Attributes:
         phi: φ of the nodes, shape (blocks, nodes of a block); the ends are the φ-lines, 0 and 2π.
-        z_cells: z of the nodes, shape (ξ-cells, nodes of a cell), with the ends of neighbours equal.
+        z: z of the nodes, shape (n,); of states their numbers from 1 on, and up to 0.4 to either side.
         problem: whose functions they show.
         order: degree of the quadrilaterals.
         is_lines: whether ξ has some values alone, so that a picture has a line for each.
     """
 
     phi: FloatArray
-    z_cells: FloatArray
+    z: FloatArray
     problem: Problem
     order: int
     is_lines: ClassVar[bool] = False
@@ -73,18 +74,15 @@ class Nodes:
         breaks = np.concatenate([[0.0], starts[(starts > 1e-9) & (starts < 2 * math.pi - 1e-9)], [2 * math.pi]])
         phi = _nodes(breaks, order, finer * _parts(degrees[0], order))
         if problem.noise.has_states:
-            return Strips(phi, _nodes(np.arange(0.5, xi.size + 1), order, 1), problem, order)
+            strips = _nodes(np.arange(0.5, xi.size + 1), order, 1)
+            strips = 0.8 * strips + 0.2 * strips.mean(axis=1, keepdims=True)
+            return Strips(phi, strips.ravel(), problem, order)
         lines = _z_lines(pair)
         # P_s is shown by quadrilaterals as high as a noise unit, or higher far out, as in algebraic tails
         inner = np.minimum(abs(lines[:-1]), abs(lines[1:]))
         tall = math.ceil(np.max(np.diff(lines) / np.maximum(1.0, inner / 6)) - 1e-9)
         z = _nodes(lines, order, finer * max(tall, _parts(degrees[1] if xi.lines.size else 0, order)))
-        return cls(phi, z, problem, order)
-
-    @property
-    def z(self) -> FloatArray:
-        """z of the nodes, each once."""
-        return np.append(self.z_cells[:, :-1], self.z_cells[-1, -1])
+        return cls(phi, np.append(z[:, :-1], z[-1, -1]), problem, order)
 
     @property
     def y(self) -> FloatArray:
@@ -121,7 +119,7 @@ class Nodes:
         """The same where the tilted density, or that of the noise, is not negligible."""
         densities = self.fields(pair).tilted_density.max(axis=0), self.problem.valued.density(self.y)
         living = np.flatnonzero(np.any([each > NEGLIGIBLE * each.max() for each in densities], axis=0))
-        return replace(self, z_cells=self.z[None, living[0] : living[-1] + 1])
+        return replace(self, z=self.z[living[0] : living[-1] + 1])
 
     def fields(self, pair: PrincipalPair, at: Samples | None = None) -> Fields:
         """The functions of a pair at the nodes, shape (φ-nodes, ξ-nodes), or at other samples of ξ."""
@@ -131,24 +129,20 @@ class Nodes:
 
     def samples(self, pair: PrincipalPair) -> Samples:
         """The functions of ξ at the nodes."""
-        axis: Any = pair.space.xi
-        found: Samples = axis.at(self.z)
-        return found
+        return cast("LineAxis", pair.space.xi).at(self.z)
 
     def points(self) -> FloatArray:
         """(φ, y, 0), φ slowest, shape (points, 3)."""
         phi, y = np.meshgrid(self.phi.ravel(), self.y, indexing="ij")
         return np.stack([phi.ravel(), y.ravel(), np.zeros(phi.size)], axis=1)
 
-    def cells(self) -> Any:
+    def cells(self) -> IntArray:
         """Points of each quadrilateral in VTK's order, shape (cells, (order + 1)²)."""
         k, (blocks, nodes) = self.order, self.phi.shape
         columns = (np.arange(blocks)[:, None] * nodes + np.arange(0, nodes - 1, k)).ravel()
         rows = np.arange(0, self.z.size - 1, k + self.is_lines)  # lines share no nodes
         corners = columns[:, None] * self.z.size + rows
-        inner = range(1, k)
-        edges = [*((i, 0) for i in inner), *((k, j) for j in inner), *((i, k) for i in inner), *((0, j) for j in inner)]
-        i, j = np.transpose([(0, 0), (k, 0), (k, k), (0, k), *edges, *((i, j) for j in inner for i in inner)])
+        i, j = np.transpose(nodes_of_quadrilateral(k))
         return corners.reshape(-1, 1) + i * self.z.size + j
 
 
@@ -179,17 +173,13 @@ class Strips(Nodes):
             return f"{noise.kind or 'white'} noise"
         return "; ".join(["states", *(f"xi = {each:g}" for each in self.xi if self.xi.size <= MOST_STATES)])
 
-    @property
-    def z(self) -> FloatArray:
-        return 0.8 * self.z_cells.ravel() + 0.2 * self.z_cells.mean(axis=1).repeat(self.z_cells.shape[1])
-
     def seen(self, pair: PrincipalPair) -> Strips:
         """All of them."""
         return self
 
     def samples(self, pair: PrincipalPair) -> Samples:
-        at, states = pair.space.xi.samples(), np.arange(self.z_cells.shape[0]).repeat(self.z_cells.shape[1])
-        return Samples(*(each[states] for each in at))
+        states = np.arange(self.z.size) // (self.order + 1)
+        return Samples(*(each[states] for each in pair.space.xi.samples()))
 
 
 def _z_lines(pair: PrincipalPair) -> FloatArray:

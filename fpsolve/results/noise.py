@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import tomlkit
 
 from fpsolve import __version__
@@ -15,8 +13,10 @@ from fpsolve.analysis.spreads import Spread
 from fpsolve.case.rewrite import rewritten
 from fpsolve.measured import NoiseFit
 from fpsolve.measured.fit import NAMES
+from fpsolve.measured.signals import SIGNALS
 from fpsolve.model import Noise
-from fpsolve.solve.noise import SIGNAL_WORDS, NoiseOutcome, density_of, oscillator_of
+from fpsolve.results.csv_json import Content, sampled
+from fpsolve.solve.noise import NoiseOutcome, density_of, oscillator_of
 
 
 def noise_sections(outcome: NoiseOutcome) -> str:
@@ -29,7 +29,7 @@ def noise_sections(outcome: NoiseOutcome) -> str:
         wanted.case.system.noise_unit if wanted.case else {"stiffness": "1/time²", "damping": "1/time"}[wanted.noise_in]
     )
     told = {"1/time²": "ω² times the relative stiffness, in 1/s²", "1/time": "the damping, in 1/s"}
-    about = told.get(unit, f"the {SIGNAL_WORDS[wanted.noise_in]}")
+    about = told.get(unit, f"the {SIGNALS[wanted.noise_in].words}")
     found = ""
     for name, section, noise in zip(NAMES, sections, fit.parts, strict=False):
         found += f"\n{f'[{section}]':34}  # {about}\n" + "".join(f"{line}\n" for line in _lines(noise, fit, name))
@@ -79,25 +79,21 @@ def case_of(outcome: NoiseOutcome, folder: Path) -> str:
     return tomlkit.dumps(data) + sections
 
 
-def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
+def summary(outcome: NoiseOutcome, source: Path) -> Content:
     """All numbers; null where one is not known."""
-    wanted, fit, scaled = outcome.wanted, outcome.fit, outcome.scaled
+    wanted, fit, is_formula = outcome.wanted, outcome.fit, outcome.fit.spectrum.is_formula
 
-    def numbers(each: NoiseFit) -> dict[str, Any]:
-        return {
-            "parameters": dict(each.parameters),
-            "errors": dict(each.errors),
-            "covariance": each.covariance.tolist(),
-        }
+    def numbers(each: NoiseFit) -> Content:
+        known = {"parameters": dict(each.parameters), "errors": dict(each.errors)}
+        return {**known, "covariance": each.covariance.tolist()}
 
-    def spread(each: Spread | None) -> dict[str, float | None] | None:
+    def spread(each: Spread | None) -> Content | None:
         if each is None:
             return None
-        error, below = (None, None) if fit.spectrum.is_formula else (each.deviation, each.below)
-        return {"value": each.value, "standard_error": error, "probability_below_0": below}
+        error, below = (None, None) if is_formula else (each.deviation, each.below)
+        return {**sampled(each.value, error), "probability_below_0": below}
 
-    omega = [each.omega for each in fit.misfit]
-    densities, errors = density_of(fit, omega) if omega else (np.zeros(0), np.zeros(0))
+    densities, errors = density_of(fit, [each.omega for each in fit.misfit])
     return {
         "file": source.name,
         "fpsolve_version": __version__,
@@ -106,22 +102,22 @@ def summary(outcome: NoiseOutcome, source: Path) -> dict[str, Any]:
         "kind": wanted.kind,
         "units": {"time": "s"},
         "natural_frequencies": list(wanted.modes.omega),
-        "fit": {"signal": SIGNAL_WORDS[wanted.noise_in], **numbers(fit)},
-        "noise": numbers(scaled),
+        "fit": {"signal": SIGNALS[wanted.noise_in].words, **numbers(fit)},
+        "noise": numbers(outcome.scaled),
         "frequencies": [
             {
                 "name": each.name,
                 "omega": each.omega,
-                "density": float(density),
-                "density_error": float(error),
+                "density": density,
+                "density_error": error,
                 "measured_over_fitted": 1 + each.relative,
                 "measured_over_fitted_error": each.error,
             }
-            for each, density, error in zip(fit.misfit, densities, errors, strict=True)
+            for each, density, error in zip(fit.misfit, densities.tolist(), errors.tolist(), strict=True)
         ],
         "critical_damping_ratio": {
-            "lyapunov_exponent": outcome.exponent and outcome.exponent._asdict(),
-            "moment": outcome.moment and outcome.moment._asdict(),
+            "lyapunov_exponent": outcome.exponent and sampled(*outcome.exponent),
+            "moment": outcome.moment and sampled(*outcome.moment),
         },
         "lyapunov_exponent": outcome.verdict and spread(outcome.verdict.exponent),
         "second_moment": outcome.verdict and spread(outcome.verdict.moment),

@@ -8,7 +8,7 @@ import numpy as np
 
 from fpsolve.case.case import Curve
 from fpsolve.files import write_csv
-from fpsolve.results.vtk import field_data, write_between
+from fpsolve.results.vtk import facts_of_curve, write_between
 from fpsolve.solve.curve import CurveResponse
 
 
@@ -22,16 +22,11 @@ def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
     if found.density is None:
         return
     density, system = found.density, curve.problem.linear
-    rows = zip(density.amplitude.tolist(), density.of_amplitude.tolist(), strict=True)
+    rows = np.stack([density.amplitude, density.of_amplitude], axis=1).tolist()
     write_csv(folder / f"response{curve.suffix}.csv", ["amplitude", "density"], rows)
     about = system.response
     known = {about.numbers[name].name: each.value for name, each in found.numbers.items()}
-    facts = {
-        **known,
-        "stability_index": found.stability_index,
-        "curve": float(curve.number),
-        **field_data(curve.parameters, curve.varied, curve.problem),
-    }
+    facts = {**known, "stability_index": found.stability_index, **facts_of_curve(curve)}
     phases, of_plane = density.plane(about.has_wall)
     a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
     plane = {"density": of_plane, "amplitude": a, "phi": phi}

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fpsolve.case.case import Case
 from fpsolve.files import write_csv, write_json
-from fpsolve.results.tables import head, parameters_of
-from fpsolve.results.vtk import field_data, pyvista_module, write_vtk
+from fpsolve.results.csv_json import head, parameters_of, sampled
+from fpsolve.results.vtk import facts_of_curve, pyvista_module, write_vtk
 from fpsolve.solve.curve import SimulatedCurve
 
 if TYPE_CHECKING:
@@ -28,23 +29,20 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         **head(case),
         **parameters_of(simulated.curve),
         "estimates": [asdict(estimate) for estimate in result.estimates],
-        **_with_errors(simulated.estimates),
-        **{name: getattr(result, name) for name in ("paths", "time", "step", "seed", "impacts")},
+        **{name: sampled(*each) for name, each in simulated.estimates.items()},
+        **{name: vars(result)[name] for name in ("paths", "time", "step", "seed", "impacts")},
         "response": response
         and {
-            "means": _with_errors(response.means),
+            "means": {name: sampled(*each) for name, each in response.means.items()},
             **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
-            **{name: getattr(response, name) for name in ("outside", "time")},
+            "outside": response.outside,
+            "time": response.time,
         },
         "warnings": simulated.warnings,
     }
     write_json(folder / f"monte_carlo{simulated.curve.suffix}.json", content)
     if response is not None:
         _write_response(simulated, response, folder)
-
-
-def _with_errors(numbers: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
-    return {name: {"value": value, "standard_error": error} for name, (value, error) in numbers.items()}
 
 
 def _write_response(simulated: SimulatedCurve, response: Response, folder: Path) -> None:
@@ -54,14 +52,12 @@ def _write_response(simulated: SimulatedCurve, response: Response, folder: Path)
     `write_eigenfunctions`.
     """
     curve, found, edges = simulated.curve, simulated.result, response.amplitude_edges
-    columns = (edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error)
-    rows = (map(float, row) for row in zip(*columns, strict=True))
+    columns = edges[:-1], edges[1:], response.amplitude_density, response.amplitude_error
     header = ["amplitude_from", "amplitude_to", "density", "standard_error"]
-    write_csv(folder / f"monte_carlo_response{curve.suffix}.csv", header, rows)
+    write_csv(folder / f"monte_carlo_response{curve.suffix}.csv", header, np.stack(columns, axis=1).tolist())
     path, x, v = folder / f"monte_carlo_response{curve.suffix}.vti", response.x_edges, response.v_edges
     size, spacing = (x.size, v.size, 1), (x[1] - x[0], v[1] - v[0], 1.0)
     grid = pyvista_module().ImageData(dimensions=size, spacing=spacing, origin=(x[0], v[0], 0.0))
     grid.cell_data["density"] = response.density.ravel(order="F")
-    known = {name: getattr(found, name) for name in ("lyapunov_exponent", "lyapunov_exponent_error")}
-    parameters = {**curve.parameters, "curve": float(curve.number)}
-    write_vtk(path, grid, {**known, **field_data(parameters, curve.varied, curve.problem)})
+    value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
+    write_vtk(path, grid, {"lyapunov_exponent": value, "lyapunov_exponent_error": error, **facts_of_curve(curve)})

@@ -1,23 +1,27 @@
-"""The numbers of a case as one table: a column for each quantity, over the curves, or over these and p.
-
-A row is what one curve adds: a number for each column by its name, or several, one for each p of its own under "p".
-"""
+"""The numbers of a case as one table: a column for each quantity, over the curves, or over these and p."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Case
 from fpsolve.data import Quantity
+from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
+from fpsolve.solve.curve import CurveResult, Number, Status
+from fpsolve.solve.questions import QUESTIONS
 
-Row = Mapping[str, Any]
-NO_P = np.zeros(0)
-"""The p of curves that have no numbers over p."""
+Cell = str | float | None
+"""What CSV and JSON have of a number: nothing where there is none."""
+COUNTS = (
+    Quantity("p_solved", "p solved", "number of p that are solved"),
+    Quantity("p_failed", "p failed", "number of p that failed"),
+)
+"""The numbers of p of a curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,32 +38,62 @@ class Column:
 
 
 class Table(dict[str, Column]):
-    """Columns by the names of their quantities.
+    """Columns by the names of their quantities, those over p first, with a row for each curve of a case.
 
     Args:
-        quantities: of the columns, in order.
-        count: how many curves there are.
-        p: all that a curve may have.
+        case: which tells what is asked for.
+        results: of some of its curves.
+
+    Attributes:
+        p: over which the columns over p are, shape (p,).
+        messages: what is said of each curve, joined by "; ".
     """
 
-    def __init__(self, quantities: Sequence[Quantity], count: int, p: FloatArray) -> None:
-        self._places = {each: place for place, each in enumerate(p.tolist())}
-        for each in quantities:
-            self[each.name] = Column(each, np.full((count, p.size) if each.dims else count, math.nan))
+    def __init__(self, case: Case, results: Iterable[CurveResult] = ()) -> None:
+        self._case, self.p = case, case.p if MOMENT.name in case.asked else np.zeros(0)
+        self.messages = [""] * case.planned
+        found = [each for question in QUESTIONS for each in question.numbers(case, None)]
+        for each in (*sorted(found, key=lambda each: not each.dims), *COUNTS, STATUS, SECONDS):
+            shape = (case.planned, self.p.size) if each.dims else case.planned
+            self[each.name] = Column(each, np.full(shape, math.nan))
+        for result in results:
+            self.put(result)
 
-    def put(self, curve: int, row: Row) -> None:
-        """Fill in what a curve adds, counted from 0."""
-        places = [self._places[p] for p in row["p"].tolist()] if self._places else []
-        for name, column in self.items():
-            if (found := row.get(name)) is not None:
-                column.values[(curve, places) if column.quantity.dims else curve] = found
+    def put(self, result: CurveResult) -> None:
+        """Fill in the numbers and the messages of a curve."""
+        curve, solved = result.curve.number - 1, result.moments.p
+        places = [self.p.tolist().index(p) for p in solved.tolist()] if self.p.size else []
+        counts = solved.size, self.p.size - solved.size, result.status, round(result.seconds, 6)
+        numbers: dict[Quantity, Number] = dict(zip((*COUNTS, STATUS, SECONDS), counts, strict=True))
+        for question in QUESTIONS:
+            numbers |= question.numbers(self._case, result)
+        for quantity, found in numbers.items():
+            if found is not None:
+                self[quantity.name].values[(curve, places) if quantity.dims else curve] = found
+        self.messages[curve] = "; ".join(text for texts in result.remarks.values() for text in texts)
+
+    def row(self, number: int) -> dict[str, Cell]:
+        """What is no function of p of the curve with a number, by the names of the columns."""
+        return {
+            name: _cell(each.quantity, each.values[number - 1].item())
+            for name, each in self.items()
+            if not each.quantity.dims
+        }
+
+    def over_p(self, number: int) -> list[dict[str, Cell]]:
+        """What is a function of p of the curve with a number, at each p that was solved."""
+        columns = {name: each.values[number - 1] for name, each in self.items() if each.quantity.dims}
+        solved = np.flatnonzero(~np.isnan(columns[MOMENT.name])).tolist() if self.p.size else ()
+        numbers = {"p": self.p, **columns}
+        return [{name: plain(values[place].item()) for name, values in numbers.items()} for place in solved]
 
 
-def plain(number: Any) -> Any:
+def plain(number: float) -> float | None:
     """A number as JSON and CSV have it: None where there is none."""
-    return None if isinstance(number, float) and not math.isfinite(number) else number
+    return number if math.isfinite(number) else None
 
 
-def pair(name: str, estimate: Any) -> dict[str, float | None]:
-    """A number and its error by their names; None where there is none."""
-    return {name: estimate and estimate.value, f"{name}_error": estimate and estimate.error_estimate}
+def _cell(quantity: Quantity, number: float) -> Cell:
+    if quantity is STATUS:
+        return Status(int(number)).word
+    return int(number) if quantity in COUNTS else plain(number)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
+from fpsolve.case.case import Curve
 from fpsolve.data import written
 from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
@@ -19,6 +20,7 @@ from fpsolve.signals import signals_held
 
 LINE = 90
 """Largest number of letters of a line of parameters."""
+Shown = TypeVar("Shown")
 Facts = Mapping[str, Any]
 """Field data by their names."""
 
@@ -30,9 +32,14 @@ def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> 
         "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in varied),
         "held": "\n".join(parameter_lines(known, varied)),
     }
-    named = {f"{key} = {each.value}": 1.0 for key, each in known.items() if isinstance(each.value, str)}
-    numbers = {key: each for key, each in parameters.items() if f"{key} = {each}" not in named}
-    return numbers | named | {name: text.replace("²", "^2") for name, text in words.items() if text}
+    stated = {f"{key} = {each}" if isinstance(each, str) else key: each for key, each in parameters.items()}
+    numbers = {name: 1.0 if isinstance(each, str) else each for name, each in stated.items()}
+    return numbers | {name: text.replace("²", "^2") for name, text in words.items() if text}
+
+
+def facts_of_curve(curve: Curve) -> Facts:
+    """The field data of a curve: its number, and its parameters."""
+    return field_data({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)
 
 
 def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
@@ -70,6 +77,15 @@ def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, A
     write_points(path, pyvista.UnstructuredGrid({kind: np.stack(corners, axis=1)}, points), data, facts)
 
 
+def nodes_of_quadrilateral(degree: int) -> Sequence[tuple[int, int]]:
+    """The places of the nodes of a Lagrange quadrilateral along its sides, in VTK's order."""
+    from vtkmodules.vtkCommonDataModel import vtkLagrangeQuadrilateral
+
+    number: Any = vtkLagrangeQuadrilateral.PointIndexFromIJK
+    places = [(i, j) for i in range(degree + 1) for j in range(degree + 1)]
+    return sorted(places, key=lambda place: number(*place, [degree, degree]))
+
+
 def write_points(path: Path, grid: Any, data: Mapping[str, FloatArray], facts: Facts) -> None:
     """Write a .vtu file of a grid with point data, of which the first is shown first, and field data."""
     for name, values in data.items():
@@ -78,15 +94,17 @@ def write_points(path: Path, grid: Any, data: Mapping[str, FloatArray], facts: F
     write_vtk(path, grid, facts)
 
 
-def write_series(folder: Path, stem: str, by_p: Mapping[float, Callable[[Path], None]]) -> list[Path]:
-    """Write `<stem>.pvd`, a time series over p, and its file of each p.
+def write_series(
+    folder: Path, stem: str, by_p: Mapping[float, Shown], write: Callable[[Path, Shown], None]
+) -> list[Path]:
+    """Write `<stem>.pvd`, a time series over p, and by `write` the file of what is shown at each p.
 
     Returns:
         The files, the collection first.
     """
     names = {p: name_at(stem, p) for p in sorted(by_p)}
     for p, name in names.items():
-        by_p[p](folder / name)
+        write(folder / name, by_p[p])
     collection = folder / f"{stem}.pvd"
     write_text(collection, collection_of((p, name, "") for p, name in names.items()))
     return [collection, *(folder / name for name in names.values())]
@@ -123,7 +141,7 @@ def collection_of(entries: Iterable[tuple[float, str, str]]) -> str:
 
 
 def pyvista_module() -> Any:
-    """pyvista, which takes half a second. No signal interrupts the import of it and of VTK's writers."""
+    """pyvista, which takes 350 ms. No signal interrupts the import of it and of VTK's writers."""
     with signals_held():
         import pyvista
         import vtkmodules.vtkIOXML  # noqa: F401

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
+from contourpy import contour_generator
 
-from fpsolve.analysis.axis import Axis
+from fpsolve.analysis.axis import check_axes
 from fpsolve.analysis.regions import P_BIFURCATIONS, Regions, regions
 from fpsolve.analysis.scan import Sample, Scan, scan_row
 from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, untraced
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
+from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import ChartSection
-from fpsolve.errors import FpsolveError, NoPerturbationTheory
+from fpsolve.case.vary import assignments
+from fpsolve.errors import NoPerturbationTheory
 from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message, message_of
-from fpsolve.model.problem import Problem
+from fpsolve.model.faults import TableError
 from fpsolve.pool import Pool
 from fpsolve.solve.records import Records, answered, key_of, made, plain
 from fpsolve.theory.perturbation import second_order
@@ -75,22 +80,35 @@ class Chart:
 
 
 def charted(case: Case) -> ChartSection:
-    """The frame of a case and the lines in it. Raises `FpsolveError` where it has none."""
+    """The frame of a case and the lines in it. Raises `CaseError` where it has none."""
     if case.chart is not None:
         return case.chart
-    raise FpsolveError(
-        f'{case.path}: chart: missing; add [chart] with x = {{ key = "oscillator.omega", start = 0.3, '
-        'stop = 5.0 }, y like it, and lines = ["moment(2) = 0"]'
+    raise case.refusal(
+        'missing; add [chart] with x = { key = "oscillator.omega", start = 0.3, stop = 5.0 }, y like it, and '
+        'lines = ["moment(2) = 0"]',
+        "chart",
     )
 
 
 def refuse_no_chart(case: Case) -> None:
-    """Refuse a case without a chart, or that varies another key than its two. Raises `FpsolveError`."""
-    frame = charted(case)
+    """Refuse a case without a chart, or whose axes span no frame, or that varies another key than these two.
+
+    Raises:
+        CaseError: it is such a case.
+    """
+    frame, problem = charted(case), case.problem
+    try:
+        check_axes(problem, frame.x, frame.y)
+    except TableError as failure:
+        raise case.refusal(failure.text, "chart", *failure.path) from None
     if set(case.vary.keys) - {frame.x.key, frame.y.key}:
-        raise FpsolveError(
-            f"{case.path}: vary: a chart has one set of the other parameters; remove [vary], or write --set vary={{}}"
-        )
+        text = "a chart has one set of the other parameters; remove [vary], or write --set vary={}"
+        raise case.refusal(text, "vary")
+    p = np.array([target.order for target in frame.lines])
+    for x, y in product((frame.x.start, frame.x.stop), (frame.y.start, frame.y.stop)):
+        corner = {frame.x.key: x, frame.y.key: y}
+        if reason := obstacle(problem, corner, p):
+            raise case.refusal(f"with {assignments(corner)}: {reason}; choose another frame", "chart")
 
 
 def dear_lines(case: Case) -> Message | None:
@@ -110,59 +128,51 @@ def begun_lines(case: Case) -> list[Boundary]:
 
 
 def solve_chart(
-    case: Case,
     lines: Sequence[Boundary],
     rows: Iterator[Scan],
+    closed_forms: tuple[tuple[FloatArray, ...], ...] = (),
     *,
     progress: Callable[[], None] = lambda: None,
     stepped: Callable[[], None] = lambda: None,
-    has_closed_forms: bool = True,
 ) -> Iterator[Chart]:
     """What there is so far, after each scan, branch and line, and in the end the whole chart.
 
     Args:
-        case: with a chart, see `refuse_no_chart`.
         lines: see `begun_lines`.
         rows: what `scan_row` gives for the `rows` of all lines, in order.
+        closed_forms: see `closed_forms_of`.
         progress: called once for each node of each scan.
         stepped: called once for each point that is traced.
-        has_closed_forms: whether they are found, too, which takes seconds.
     """
-    axes = lines[0].x, lines[0].y
-    chart = Chart((), _closed_forms(lines[0].problem, charted(case).lines, axes) if has_closed_forms else ())
+    done: tuple[Boundary, ...] = ()
     for each in lines:
-        done = chart.lines
         for line in each.solve(rows, progress, stepped):
-            chart = replace(chart, lines=(*done, line))
-            yield chart
-    whole = tuple(crossed(chart.lines))
-    yield Chart(whole, chart.closed_forms, regions(whole), complete=all(line.complete for line in whole))
+            yield Chart((*done, line), closed_forms)
+        done = *done, line
+    whole = tuple(crossed(done))
+    yield Chart(whole, closed_forms, regions(whole), complete=all(line.complete for line in whole))
 
 
-def _closed_forms(
-    problem: Problem, targets: Sequence[Target], axes: tuple[Axis, Axis]
-) -> tuple[tuple[FloatArray, ...], ...]:
+def closed_forms_of(lines: Sequence[Boundary]) -> tuple[tuple[FloatArray, ...], ...]:
     """The lines ε²Λ₂(p)/p = 0 in the parameters themselves, for noise that is reduced as in the paper."""
-    from contourpy import contour_generator
-
+    problem, x, y = lines[0].problem, lines[0].x, lines[0].y
     shares = np.linspace(0, 1, CLOSED_FORM_NODES)
-    x, y = axes
-    linear, quadratic = np.full((2, shares.size, shares.size), np.nan)
-    for i, u in enumerate(shares):
-        for j, v in enumerate(shares):
-            try:
-                here = problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))})
-                theory = second_order(here)
-            except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
-                continue
-            linear[j, i], quadratic[j, i] = theory.lyapunov_exponent, theory.quadratic
-    found = []
-    for target in targets:
-        ratio = linear + target.order * quadratic
-        values = np.ma.masked_invalid((target.p or 1.0) * ratio - target.level)
-        lines: list[FloatArray] = contour_generator(shares, shares, values, line_type="Separate").lines(0.0)  # type: ignore[assignment]
-        found.append(tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in lines))
-    return tuple(found)
+
+    def theory(u: float, v: float) -> tuple[float, float]:
+        try:
+            found = second_order(problem.at({x.key: float(x.value(u)), y.key: float(y.value(v))}))
+        except (ValueError, NoPerturbationTheory):  # no such problem, or not this form of one
+            return math.nan, math.nan
+        return found.lyapunov_exponent, found.quadratic
+
+    linear, quadratic = np.moveaxis(np.array([[theory(u, v) for u in shares] for v in shares]), -1, 0)
+
+    def branches(target: Target) -> tuple[FloatArray, ...]:
+        values = (target.p or 1.0) * (linear + target.order * quadratic) - target.level
+        found: list[FloatArray] = contour_generator(shares, shares, np.ma.masked_invalid(values)).lines(0.0)  # type: ignore[assignment]
+        return tuple(np.stack([x.value(line[:, 0]), y.value(line[:, 1])], axis=1) for line in found)
+
+    return tuple(branches(line.target) for line in lines)
 
 
 def key_of_line(case: Case, line: Boundary) -> str:
@@ -182,14 +192,14 @@ def recalled(records: Records, key: str, line: Boundary) -> Boundary:
         name = str(at.tolist())
         if name not in known:
             known[name] = found = solve(at)
-            if not (isinstance(found, Message) and may_pass(found)):
+            if not (isinstance(found, Message) and _may_pass(found)):
                 records.put(key, {name: plain(POINT, found)})
         return known[name]
 
     return replace(line, recall=recall)
 
 
-def may_pass(reason: Message) -> bool:
+def _may_pass(reason: Message) -> bool:
     """Whether a reason may be gone the next time, so that it is not recorded."""
     return reason.tells_of(Code.NO_MEMORY) or reason.tells_of(Code.SECONDS_SPENT) or is_of_line(reason)
 
@@ -199,12 +209,11 @@ def scans_of(keys: Mapping[str, Boundary], records: Records, pool: Pool) -> Iter
     rows = {
         row: key_of(key, line.scan_rtol, row.count, row.number) for key, line in keys.items() for row in line.rows()
     }
-
-    def keeps(scan: Scan) -> bool:
-        return not any(map(may_pass, scan.reasons))
-
-    found = answered(records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__, keeps=keeps)
-    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in found)
+    how = answered(
+        records, pool, scan_row, rows, kind=Scan, key=rows.__getitem__,
+        keeps=lambda scan: not any(map(_may_pass, scan.reasons)),
+    )  # fmt: skip
+    return (replace(scan, seconds=0.0) if is_known else scan for _, scan, is_known in how)
 
 
 def appears(target: Target) -> str | None:

@@ -37,14 +37,10 @@ class Comparison:
     @classmethod
     def of(cls, wanted: Expectation, result: CurveResult) -> Comparison:
         """An expectation beside a curve."""
-        if wanted.p is not None:
-            at = np.flatnonzero(np.isclose(result.moments.p, wanted.p, rtol=0, atol=1e-12))
-            value = float(result.moments.value[at[0]]) if at.size else None
-        else:
-            numbers = result.response.numbers if result.response else {}
-            estimate = numbers.get(wanted.of_response) if wanted.of_response else result.estimates[wanted.quantity]
-            value = None if estimate is None else estimate.value
-        tolerance = max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
+        response = result.response.numbers if result.response else {}
+        known = response if wanted.of_response else result.estimates
+        found = known.get(wanted.of_response or wanted.quantity) if wanted.p is None else result.moment(wanted.p)
+        value, tolerance = found and found.value, max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
         met = value is not None and abs(value - wanted.value) <= tolerance
         return cls(wanted, dict(result.curve.varied), value, tolerance, met)
 
@@ -80,8 +76,12 @@ def expected(case: Case, varied: Varied) -> Asked:
 
 def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     """Every expectation of a case against every curve that it selects."""
-    pairs = ((wanted, result) for wanted in case.expect for result in results)
-    return [Comparison.of(*pair) for pair in pairs if pair[0].selects(pair[1].curve.varied)]
+    return [
+        Comparison.of(wanted, result)
+        for wanted in case.expect
+        for result in results
+        if wanted.selects(result.curve.varied)
+    ]
 
 
 def even_moments(case: Case) -> FloatArray:
@@ -108,15 +108,14 @@ def refuse_no_hierarchy(case: Case) -> None:
 
 def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
     """Λ of the even p of every curve beside the hierarchy; they agree within the stated error and rounding."""
-    found = []
-    for result in results:
-        errors = dict(zip(result.moments.p.tolist(), result.moments.error_estimate.tolist(), strict=True))
-        for p in even_moments(case).tolist():
-            known = even_moment(result.curve.problem, p)
-            error = errors.get(p, 0.0) + known.error
-            wanted = Expectation(quantity="moment", p=p, value=known.value, atol=error, source=SOURCE)
-            found.append(Comparison.of(wanted, result))
-    return found
+
+    def comparison(result: CurveResult, p: float) -> Comparison:
+        known, found = even_moment(result.curve.problem, p), result.moment(p)
+        error = known.error + (found.error_estimate if found else 0.0)
+        wanted = Expectation(quantity="moment", p=p, value=known.value, atol=error, source=SOURCE)
+        return Comparison.of(wanted, result)
+
+    return [comparison(result, p) for result in results for p in even_moments(case).tolist()]
 
 
 def compared(job: Job) -> CurveResult:

@@ -12,11 +12,11 @@ import numpy as np
 
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
-from fpsolve.arrays import FloatArray
+from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.case.case import Curve
-from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
+from fpsolve.case.sections import EXCURSIONS, RESPONSE, SAME, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
-from fpsolve.exponent.error import Estimate, Failure, InvariantClass
+from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
@@ -49,20 +49,20 @@ class Status(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class MomentColumns:
+class MomentColumns(ReadOnly):
     """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
 
     Attributes:
         p: the moments.
-        value, derivative, error_estimate, derivative_error, residual: as in `MomentLyapunov`.
+        value, derivative, derivative_error, error_estimate, residual: as in `MomentLyapunov`.
         perturbation: Eq. (37) at the same p.
     """
 
     p: FloatArray
     value: FloatArray
     derivative: FloatArray
-    error_estimate: FloatArray
     derivative_error: FloatArray
+    error_estimate: FloatArray
     residual: FloatArray
     perturbation: FloatArray
 
@@ -72,12 +72,21 @@ class MomentColumns:
         return np.asarray(self.p * self.derivative - self.value) + 0.0
 
 
+Number = float | FloatArray | None
+"""What a quantity is of one curve, or at each of its p; None where there is none."""
+
+
+def estimated(quantity: Quantity, estimate: Estimate | None) -> dict[Quantity, Number]:
+    """A number and its error by their quantities; None where there is none."""
+    return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
+
+
 NO_MOMENTS = MomentColumns(*[np.zeros(0)] * 7)
 """Λ(p) at no p."""
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseDensity:
+class ResponseDensity(ReadOnly):
     """The stationary density on a grid; of the phase both ends are there, of the others the middles of cells.
 
     Attributes:
@@ -139,27 +148,30 @@ class CurveResult(Result):
     Attributes:
         curve: the parameters, the oscillator and the noise.
         moments: Λ(p); where some p failed, of the others.
-        estimates: of each of the `INDICES`, by its name; None where there is none, it was not asked for, or it did not
-            converge.
-        discretisation: what was used for the p of the largest size; None where no p was solved.
+        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
         failures: why some p are missing, or with all p some indices.
-        classes: λ and Λ(p) of blocks of variables, or on a ray that the phase never leaves and across it.
-        parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         seconds: how long the processor took.
     """
 
     curve: Curve
     moments: MomentColumns
-    estimates: Mapping[str, Estimate | None]
-    discretisation: dict[str, Any] | None = None
+    parts: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[Message, ...] = ()
     notes: tuple[Message, ...] = ()
     failures: tuple[Failure, ...] = ()
-    classes: tuple[InvariantClass, ...] = ()
-    parts: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+
+    @property
+    def estimates(self) -> Mapping[str, Estimate | None]:
+        """Of each of the `INDICES`, by its name; None where there is none, it was not asked for, or not found."""
+        return {name: self.parts.get(name) for name in INDICES}
+
+    @property
+    def discretisation(self) -> dict[str, Any] | None:
+        """What was used for the p of the largest size; None where no p was solved."""
+        return self.parts.get("discretisation") or None
 
     @property
     def excursion(self) -> Excursion | None:
@@ -179,21 +191,21 @@ class CurveResult(Result):
     @property
     def lyapunov_exponent(self) -> Estimate | None:
         """λ."""
-        return self.estimates[LYAPUNOV_EXPONENT.name]
+        return self.parts.get(LYAPUNOV_EXPONENT.name)
 
     @property
     def stability_index(self) -> Estimate | None:
         """δ_p."""
-        return self.estimates[STABILITY_INDEX.name]
+        return self.parts.get(STABILITY_INDEX.name)
 
     @property
     def variance_rate(self) -> Estimate | None:
         """Λ″(0)."""
-        return self.estimates[VARIANCE_RATE.name]
+        return self.parts.get(VARIANCE_RATE.name)
 
     def moment(self, p: float) -> Estimate | None:
         """Λ at one p; None where it is not known."""
-        for place in np.flatnonzero(self.moments.p == p).tolist():
+        for place in np.flatnonzero(np.isclose(self.moments.p, p, rtol=0, atol=SAME)).tolist():
             value, error = self.moments.value[place], self.moments.error_estimate[place]
             return Estimate(float(value), float(error), 0.0, quantity=moment_at(p))
         return None
@@ -217,10 +229,9 @@ class CurveResult(Result):
     def to_xarray(self) -> xarray.Dataset:
         """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
         found = self.moments
-        numbers: dict[Quantity, Any] = {each: getattr(found, name) for name, each in OVER_P.items()}
+        numbers: dict[Quantity, Number] = {each: vars(found)[name] for name, each in OVER_P.items()}
         for name, each in self.estimates.items():
-            if each:
-                numbers |= {INDICES[name]: each.value, INDICES[name].error(): each.error_estimate}
+            numbers |= estimated(INDICES[name], each) if each else {}
         title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), {P: found.p}
         more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
         return dataset(title, "finite elements", numbers, places, self.curve.parameters, **more)

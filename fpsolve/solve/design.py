@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.analysis.inverse import Design, axes_of, start_and_stop, units_of
@@ -39,7 +38,7 @@ class DesignOutcome:
         """Whether there is none, and that is known."""
         return self.reason is not None and self.reason.code is Code.UNREACHED
 
-    def expectation(self, case: Case) -> dict[str, Any] | None:
+    def expectation(self, case: Case) -> dict[str, object] | None:
         """What a case with these values expects, as its file states it; None where its p are others."""
         if self.found is None or (self.target.kind == "moment" and not case.moments.has(self.target.p)):
             return None
@@ -84,12 +83,10 @@ def wanted_of(
         for i, key in enumerate(by):
             if start and stop:
                 ranges.append(Axis(key, start[i], stop[i]))
-            elif key not in problem.differentiable:
-                ranges.append(key)  # which is refused
-            elif (usual := start_and_stop(problem, key)) is None:
-                raise ValueError(f"{key} is 0, so that its range must be stated; write --from and --to")
-            else:
+            elif key in problem.differentiable and (usual := start_and_stop(problem, key)):
                 ranges.append(Axis(key, start[i] if start else usual.start, stop[i] if stop else usual.stop))
+            else:
+                ranges.append(key)  # which is refused
         return target, axes_of(problem, ranges)
     except ValueError as failure:
         raise FpsolveError(f"{case.path}: {failure}") from None

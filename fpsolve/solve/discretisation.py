@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ def _settings(case: Case, number: int) -> Settings:
     return {"p": max(case.p.tolist(), key=abs, default=0.0)}
 
 
-def _solve(job: Job, settings: Settings) -> dict[str, Any]:
+def _solve(job: Job, settings: Settings) -> dict[str, object]:
     """z in noise units; nothing where no p is by elements. One is solved where all numbers are from an earlier run."""
     if not largest_of(job):
         found = job.columns
@@ -28,7 +27,7 @@ def _solve(job: Job, settings: Settings) -> dict[str, Any]:
     return dict(largest[1]) if largest else {}
 
 
-def largest_of(job: Job) -> tuple[float, dict[str, Any]] | None:
+def largest_of(job: Job) -> tuple[float, dict[str, object]] | None:
     """The p of the largest size that was solved by elements, by an earlier run, too, and what it was solved on."""
     found = [job.largest] if job.largest else []
     for p, solution in job.solver.method.spaces.items():
@@ -37,4 +36,4 @@ def largest_of(job: Job) -> tuple[float, dict[str, Any]] | None:
     return max(found, key=lambda each: abs(each[0]), default=None)
 
 
-QUESTION: Question = Question("discretisation", _settings, _solve, dict[str, Any])
+QUESTION: Question = Question("discretisation", _settings, _solve, dict[str, object])

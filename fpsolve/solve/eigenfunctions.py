@@ -1,8 +1,9 @@
-"""Eigenfunctions over phase and noise, and the stationary density, for files and pictures."""
+"""Eigenfunctions over phase and noise, or densities of the directions of more variables, for files and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,12 +11,16 @@ from fpsolve.analysis.density import stationary_density
 from fpsolve.case.case import Case
 from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.density import MOST_NEGATIVE, UNRESOLVED, densities
+from fpsolve.exponent.density import MOST_NEGATIVE, RESOLVED, UNRESOLVED, Densities, densities
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.exponent.method import PHASE_AND_NOISE, Pictures
+from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE, Pictures
+from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT
 from fpsolve.solve.question import Job, Question, Reason, Settings, attempt
+
+ROUGH = 0.05
+"""Total variation by which finer functions may move a density that a picture shows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +57,9 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     """The pairs that converge, that at p = 0 if it is to be trusted; what is said of them."""
     found = [attempt(partial(job.solver.pair, p), EIGENFUNCTIONS) for p in (*without_failed(job, settings["p"]), 0.0)]
     *pairs, stationary = (None if isinstance(each, Reason) else each for each in found)
-    known = tuple(each for each in pairs if each is not None)
-    said = list[Message]()
+    known, said = tuple(filter(None, pairs)), list[Message]()
     try:
-        if stationary is not None:
+        if stationary:
             stationary_density(stationary)
     except NotConverged as failure:
         stationary = None
@@ -73,17 +77,48 @@ def _solve(job: Job, settings: Settings) -> tuple[Message, ...]:
     return tuple(said)
 
 
+def _solve_directions(job: Job, settings: Settings) -> tuple[Message, ...]:
+    """The densities at the p that converge, at p = 0 with the stationary one; what is said of them."""
+    found, said, shown = list[Densities](), list[Message](), without_failed(job, settings["p"])
+    for p in sorted({*shown, 0.0} if settings["density"] else shown):
+        each = attempt(partial(_at, job.solver, p), DIRECTIONS.part)
+        if isinstance(each, Reason):
+            said.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=each.message))
+        else:
+            found.append(each)
+    job.pictures[DIRECTIONS.part] = tuple(found)
+    return (*said, *(message for each in found for message in _unclear(each)))
+
+
+def _at(solver: ExponentSolver, p: float) -> Densities:
+    pair = solver.pair(p)
+    with solver.meter.running():
+        return densities(pair)
+
+
+def _unclear(found: Densities) -> Iterator[Message]:
+    """Which densities mislead."""
+    p = found.pair.p
+    for name in ("T_adjoint", "tilted_density"):
+        defect = found.grid.negative_share(found.fields._asdict()[name])
+        if defect > MOST_NEGATIVE:
+            yield Message(Code.UNREADABLE, name=name, p=p, size=defect)
+    if not found.missing <= RESOLVED:
+        yield Message(Code.FINE_DENSITY, p=p, size=found.missing)
+    if not found.error <= ROUGH:
+        yield Message(Code.ROUGH_DENSITY, p=p, size=None if math.isnan(found.error) else found.error)
+
+
 def question_of_pictures(
     pictures: Pictures,
     symbol: str,
     solve: Callable[[Job, Settings], tuple[Message, ...]],
-    names: str,
 ) -> Question:
     """That of the cases of which there are such pictures; what it finds is what was said when they were solved.
 
     Args:
         pictures: what is drawn.
-        symbol, solve, names: see `Question`.
+        symbol, solve: see `Question`.
     """
     return Question(
         pictures.part,
@@ -93,9 +128,8 @@ def question_of_pictures(
         symbol,
         said=lambda found, *_: found,
         draws=True,
-        names=names,
     )
 
 
-NAMES = r"(curves|eigenfunctions(-\d+)?)\.pvd|eigenfunctions(-\d+)?/p[+-][\d.e+-]+\.vtu|density\.vtu|show\.py"
-QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve, NAMES)
+QUESTION: Question = question_of_pictures(PHASE_AND_NOISE, EIGENFUNCTIONS, _solve)
+OF_DIRECTIONS: Question = question_of_pictures(DIRECTIONS, "density of directions", _solve_directions)

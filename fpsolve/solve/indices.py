@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from fpsolve.case.case import Case, Curve
-from fpsolve.data import Quantity
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.quantities import INDICES, STABILITY_INDEX, Index
 from fpsolve.messages import Code, Message, Remedy
-from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.question import Job, Numerics, Question, Reason, Settings
+from fpsolve.solve.curve import CurveResult, estimated
+from fpsolve.solve.question import Job, Numbers, Numerics, Question, Reason, Settings
 
 
 def question_of(index: Index) -> Question:
     """The question for an index."""
-    error, by_theory = index.error(), index.perturbation
+    by_theory = index.perturbation
 
     def asked(case: Case, number: int) -> Settings | None:
         return {} if index.name in case.asked else None
@@ -45,26 +43,15 @@ def question_of(index: Index) -> Question:
                 remedy=None if numerics.solver(curve.problem).method.adapts else Remedy.MESH,
             )
 
-    def numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+    def numbers(case: Case, result: CurveResult | None) -> Numbers:
         if index.name not in case.asked:
             return {}
-        found = result and result.estimates[index.name]
-        theory: Mapping[str, float] = result.parts.get("theory", {}) if result and found else {}
-        value = {index: found and found.value, error: found and found.error_estimate}
-        return {**value, by_theory: theory.get(index.name)}
+        found = result.estimates[index.name] if result else None
+        theory = index.theory(result.curve.problem) if result and found else None
+        return {**estimated(index, found), by_theory: theory}
 
     return Question(index.name, asked, solve, Estimate, index.symbol, said=said, numbers=numbers)
 
 
 INDEX_QUESTIONS: tuple[Question, ...] = tuple(map(question_of, INDICES.values()))
 """One for each index."""
-
-
-def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
-    return {name: index.theory(job.curve.problem) for name, index in INDICES.items()}
-
-
-THEORY: Question = Question(
-    "theory", lambda case, _: None if INDICES.keys().isdisjoint(case.asked) else {}, _solve_theory, dict[str, float]
-)
-"""The indices by perturbation theory, which a record has so that tables need not make the problem of each curve."""

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, spread_of
+from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import INDICES, MOMENT
-from fpsolve.model.quantity import Quantity
 from fpsolve.solve.curve import CurveResult
-from fpsolve.solve.question import Question
+from fpsolve.solve.question import Numbers, Question
 
 INTERVAL = f"{LEVEL:.0%} interval"
 """The heading of intervals in tables."""
-ENDS = ("low", "high")
-"""Names of the ends of an interval."""
 
 
 @dataclass(frozen=True)
@@ -57,18 +54,22 @@ def spreads_of(case: Case, result: CurveResult) -> Spreads:
     )
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
+def _numbers(case: Case, result: CurveResult | None) -> Numbers:
     spreads = spreads_of(case, result) if result else Spreads()
-    of_p = [spreads.moments.get(p) for p in result.moments.p.tolist()] if result else []
-    uncertain = (MOMENT, *(INDICES[name] for name in UNCERTAIN)) if case.uncertain else ()
+    of_p = _ends([spreads.moments.get(p) for p in result.moments.p.tolist()] if result else [])
+    ends = {MOMENT: of_p} | {INDICES[name]: _ends([spreads.indices.get(name)])[:, 0] for name in UNCERTAIN}
     return {
-        each.end(end, LEVEL): np.array([getattr(at, end, math.nan) for at in of_p], dtype=float)
-        if each is MOMENT
-        else getattr(spreads.indices.get(each.name), end, None)
-        for each in uncertain
-        if each.name in case.asked
-        for end in ENDS
+        quantity.end(which, LEVEL): values
+        for quantity, both in ends.items()
+        if case.uncertain and quantity.name in case.asked
+        for which, values in zip(("low", "high"), both, strict=True)
     }
+
+
+def _ends(spreads: Sequence[Spread | None]) -> FloatArray:
+    """The lower and the upper ends of some intervals, shape (2, n); NaN where there is none."""
+    ends = [(each.low, each.high) if each else (math.nan, math.nan) for each in spreads]
+    return np.reshape(ends, (-1, 2)).T
 
 
 QUESTION: Question = Question("intervals", numbers=_numbers)

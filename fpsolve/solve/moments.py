@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.case.sections import OF_MOMENTS
-from fpsolve.data import Quantity
 from fpsolve.exponent.error import Failure, InvariantClass, Moment
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
-from fpsolve.model.quantity import MOMENT, OVER_P
-from fpsolve.solve.curve import CurveResult, MomentColumns
-from fpsolve.solve.question import UNFINISHED, Job, Numerics, Question, Settings
+from fpsolve.model.quantity import MOMENT, OVER_P, RATE_FUNCTION
+from fpsolve.solve.curve import CurveResult
+from fpsolve.solve.question import UNFINISHED, Job, Numbers, Numerics, Question, Settings
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 
@@ -26,13 +24,11 @@ class Moments:
 
     Attributes:
         failures: why some p are missing.
-        warnings: what limits the numbers.
-        notes: on them, and where the theories compared with are not valid.
+        messages: what limits the numbers, and where the theories compared with are not valid.
     """
 
     failures: tuple[Failure, ...] = ()
-    warnings: tuple[Message, ...] = ()
-    notes: tuple[Message, ...] = ()
+    messages: tuple[Message, ...] = ()
 
 
 def _settings(case: Case, number: int) -> Settings:
@@ -44,16 +40,11 @@ def _settings(case: Case, number: int) -> Settings:
 def _solve(job: Job, settings: Settings) -> Moments:
     """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
     problem, has_slopes = job.curve.problem, settings["slopes"]
-    known = {
-        p: Moment(value, slope, slope_error, error, residual)
-        for p, (value, slope, error, slope_error, residual, _) in job.rows.items()
-    }
+    known = {p: Moment(*row[:-1]) for p, row in job.rows.items()}
 
     def advance() -> None:
         for p in known.keys() - job.rows.keys():
-            found = known[p]
-            closed = float(perturbed_moments(problem, np.array(p)))
-            job.rows[p] = found.value, found.derivative, found.error, found.derivative_error, found.residual, closed
+            job.rows[p] = (*known[p], float(perturbed_moments(problem, np.array(p))))
         job.advance()
 
     refused = {p: told for p in settings["p"] if (told := job.solver.method.reason(p))}
@@ -61,28 +52,19 @@ def _solve(job: Job, settings: Settings) -> Moments:
         job.advance()
     computed = [p for p in settings["p"] if p not in refused]
     found = solve_moments(job.solver, computed, progress=advance, known=known if has_slopes else None)
-    slopes = found.derivative if settings.get("every_slope") else found.slope
-    columns = MomentColumns(
-        p=found.p,
-        value=found.value,
-        derivative=slopes,
-        error_estimate=found.error_estimate,
-        derivative_error=found.errors_of(slopes) if has_slopes else np.full(found.p.shape, np.nan),
-        residual=found.residual,
-        perturbation=perturbed_moments(problem, found.p),  # Eq. (37)
-    )
-    job.rows |= {p: row for p, *row in np.column_stack([*vars(columns).values()]).tolist()}
-    notes = *found.notes, *problem.remarks, weak_noise_note(problem, found.p, found.value)
-    return Moments(
-        (*(Failure(p, reason) for p, reason in refused.items()), *found.failures),
-        tuple(found.warnings),
-        tuple(note for note in notes if note is not None),
-    )
+    p, slopes = found.p, found.derivative if settings.get("every_slope") else found.slope
+    errors = found.errors_of(slopes) if has_slopes else np.full(p.shape, np.nan)
+    closed = perturbed_moments(problem, p)  # Eq. (37)
+    rows = np.column_stack([p, found.value, slopes, errors, found.error_estimate, found.residual, closed])
+    job.rows |= {p: row for p, *row in rows.tolist()}
+    notes = *found.notes, *problem.remarks, weak_noise_note(problem, p, found.value)
+    failures = *(Failure(p, reason) for p, reason in refused.items()), *found.failures
+    return Moments(failures, (*found.warnings, *filter(None, notes)))
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
-    of_p = OVER_P if MOMENT.name in case.asked else {}
-    return {each: result and getattr(result.moments, name) for name, each in of_p.items()}
+def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+    known = vars(result.moments) if result else {}
+    return {each: known.get(name) for name, each in OVER_P.items()} if MOMENT.name in case.asked else {}
 
 
 QUESTION: Question = Question(
@@ -90,10 +72,19 @@ QUESTION: Question = Question(
     _settings,
     _solve,
     Moments,
-    said=lambda found, *_: (*found.warnings, *found.notes),
+    said=lambda found, *_: found.messages,
     lacks=lambda found, _: (each.reason for each in found.failures),
     numbers=_numbers,
 )
+
+
+def _rates(case: Case, result: CurveResult | None) -> Numbers:
+    is_asked = {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked}
+    return {RATE_FUNCTION: result.moments.rate_function if result else None} if is_asked else {}
+
+
+RATES: Question = Question(RATE_FUNCTION.name, numbers=_rates)
+"""I(s) = ps − Λ(p) at s = Λ′(p), which follows from Λ(p)."""
 
 
 def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:

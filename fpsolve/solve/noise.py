@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +44,8 @@ RTOL = 1e-4
 """Of λ and Λ(2), whose errors by the fit are some percent."""
 SECONDS = 20.0
 """Of a processor for λ and for Λ(2) each."""
+FILES = ("noise.json", "noise.png", "noise.pdf", "noise.toml")
+"""What is written of a measurement."""
 STILL = 1e-6
 """Of a modulus: imaginary parts below are none."""
 
@@ -92,11 +94,8 @@ class Wanted:
         return SIGNALS[self.of].noise_in
 
 
-class Critical(NamedTuple):
-    """A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
-
-    value: float
-    standard_error: float
+Critical = tuple[float, float]
+"""A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,50 +158,38 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
     Raises:
         FpsolveError: the kind does not fit, or nothing was measured where it matters.
     """
-    converted = data.scaled(
-        of_support_acceleration()
-        if wanted.of == "acceleration"
-        else of_stability_height(wanted.height)
-        if wanted.of == "height" and wanted.height is not None
-        else 1.0
-    )
-    omega = wanted.modes.omega
     try:
-        if wanted.kind == NON_GAUSSIAN:
-            if not isinstance(converted, Record):
-                raise ValueError("a spectrum does not tell r0; name a record by --record")
-            if wanted.terms > 1:
-                raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
-            fit = non_gaussian_from_record(converted)
-        else:
-            second = omega[1] if len(omega) > 1 else None
-            fit = fit_noise(
-                converted,
-                wanted.kind,
-                frequency=omega[0],
-                second_frequency=second,
-                noise_in=wanted.noise_in,
-                terms=wanted.terms,
-                segment=wanted.segment,
-            )
+        fit = _fit(data, wanted)
+        fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
+        progress()
+        outcome = NoiseOutcome(wanted, fit, fit.scaled(_factor(wanted)), *_critical(fit, wanted))
+        if (system := _system(wanted, len(fit.parts))) is None:
+            return outcome
+        problem = Problem(system, outcome.scaled.noise)
+        rtol, budget = max(choose(problem).usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
+        known = verdict(problem, outcome.scaled, rtol=rtol, budget=budget, progress=progress)
+    except NotConverged as failure:
+        return replace(outcome, failure=failure.message)
     except ValueError as error:
         raise FpsolveError(str(error)) from None
-    fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
-    progress()
-    scaled = fit.scaled(_factor(wanted))
-    found = _critical(fit, wanted)
-    system = _system(wanted, len(fit.parts))
-    if system is not None:
-        try:
-            problem = Problem(system, scaled.noise)
-            rtol, budget = max(choose(problem).usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
-            known = verdict(problem, scaled, rtol=rtol, budget=budget, progress=progress)
-            found |= {"verdict": known, "failure": known.failure}
-        except NotConverged as failure:
-            found["failure"] = failure.message
-        except ValueError as error:
-            raise FpsolveError(str(error)) from None
-    return NoiseOutcome(wanted, fit, scaled, **found)
+    return replace(outcome, verdict=known, failure=known.failure)
+
+
+def _fit(data: Spectrum | Record, wanted: Wanted) -> NoiseFit:
+    """The noise of the relative stiffness, or of the damping. Raises `ValueError`, `FpsolveError`."""
+    factor = of_support_acceleration() if wanted.of == "acceleration" else 1.0
+    converted = data.scaled(factor if wanted.height is None else of_stability_height(wanted.height))
+    if wanted.kind != NON_GAUSSIAN:
+        first, *others = wanted.modes.omega
+        return fit_noise(
+            converted, wanted.kind, frequency=first, second_frequency=next(iter(others), None),
+            noise_in=wanted.noise_in, terms=wanted.terms, segment=wanted.segment,
+        )  # fmt: skip
+    if not isinstance(converted, Record):
+        raise ValueError("a spectrum does not tell r0; name a record by --record")
+    if wanted.terms > 1:
+        raise ValueError(f"got --terms {wanted.terms} for --kind {NON_GAUSSIAN}, which has one; leave it out")
+    return non_gaussian_from_record(converted)
 
 
 def _factor(wanted: Wanted) -> float:
@@ -248,20 +235,21 @@ def oscillator_of(wanted: Wanted, terms: int) -> tuple[str, dict[str, Any]]:
     return "oscillator", {"omega": omega, "c1": -2 * zeta * omega, "impact": "restitution", "epsilon": 1.0, **wall}
 
 
-def _critical(fit: NoiseFit, wanted: Wanted) -> dict[str, Any]:
+def _critical(fit: NoiseFit, wanted: Wanted) -> tuple[Critical | None, Critical | None]:
     """The damping ratios at which λ and Λ(2) vanish in weak noise, by the densities that were measured or named."""
     if len(wanted.modes.omega) > 1 or (wanted.case and wanted.case.system.noise_unit == "unknown"):
-        return {}  # of equations that have a coefficient of their own for the noise
-    omega, where = wanted.modes.omega[0], wanted.noise_in
+        return None, None  # of equations that have a coefficient of their own for the noise
+    omega = wanted.modes.omega[0]
     values, errors = density_of(fit, [2 * omega, 0.0])
     for i, each in enumerate(fit.misfit):
         values[i] *= 1 + each.relative
         errors[i] = each.error * values[i]
-    of_zero = [weak_moment(2, omega, 0.0, 0.0, each, where) for each in (values[1], errors[1])]
-    of_double = [weak_moment(2, omega, 0.0, each, 0.0, where) for each in (values[0], errors[0])]
-    exponent = [weak_exponent(omega, 0.0, each, where) / omega for each in (values[0], errors[0])]
-    moment = (of_double[0] + of_zero[0]) / (2 * omega), math.hypot(of_double[1], of_zero[1]) / (2 * omega)
-    return {"exponent": Critical(*exponent), "moment": Critical(*moment)}
+
+    def moment(at_double: float, at_zero: float) -> float:
+        return weak_moment(2, omega, 0.0, at_double, at_zero, wanted.noise_in) / (2 * omega)
+
+    value, error = (weak_exponent(omega, 0.0, each, wanted.noise_in) / omega for each in (values[0], errors[0]))
+    return (value, error), (moment(*values), math.hypot(moment(errors[0], 0.0), moment(0.0, errors[1])))
 
 
 def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, FloatArray]:
@@ -276,7 +264,3 @@ def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, Float
         up, down = (densities(fit.at({key: value + step})) for step in (h, -h))
         slopes.append((up - down) / (2 * h))
     return densities(fit), np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
-
-
-FILES = ("noise.json", "noise.png", "noise.pdf", "noise.toml")
-SIGNAL_WORDS = {"stiffness": "relative stiffness", "damping": "damping"}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
@@ -85,9 +84,9 @@ def questions(case: Case, width: float | None) -> Iterator[Question]:
 
 def gathered(case: Case, answers: Sequence[Answer]) -> list[CurveProof]:
     """What is proven of each curve, from the first answers, in the order of the questions."""
-    asked, found = asked_of(case), list[CurveProof]()
+    asked, left, found = asked_of(case), iter(answers), list[CurveProof]()
     for curve in case.curves(stop=-(-len(answers) // len(asked))):
-        known: dict[Any, Any] = dict(zip_longest(asked, answers[len(found) * len(asked) :][: len(asked)]))
+        known: dict[Any, Any] = {each: next(left, None) for each in asked}
         moments = tuple((p, known[p]) for p in case.p.tolist())
         found.append(CurveProof(curve, moments, *map(known.get, (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name))))
     return found
@@ -116,11 +115,6 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
             raise FpsolveError(f"{place}: {said(failure)}") from None
         except NoSuchExponent as failure:
             raise NoSuchExponent(Message(Code.PLACED, place=place, reason=failure.message)) from None
-
-
-def answer(question: Question) -> Answer:
-    """The task: proves what is asked."""
-    return question()
 
 
 def verified(found: Enclosure) -> Enclosure:

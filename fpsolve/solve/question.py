@@ -10,22 +10,25 @@ from functools import cached_property
 from operator import le
 from pathlib import Path
 from time import monotonic
-from typing import Any, Literal
+from types import GenericAlias
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
 from fpsolve.budget import Meter
 from fpsolve.case.case import Case, Curve
 from fpsolve.data import Quantity
-from fpsolve.errors import FpsolveError
+from fpsolve.errors import FpsolveError, MeshError
+from fpsolve.exponent.elements import GivenMesh
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.fem.mesh import CylinderMesh
 from fpsolve.messages import Code, Message, Remedy
+from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.signals import is_interrupt
-from fpsolve.solve.curve import CurveResult, MomentColumns
+from fpsolve.solve.curve import CurveResult, MomentColumns, Number
 
 Settings = Mapping[str, Any]
 """What is asked by a question, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
@@ -33,6 +36,9 @@ Asked = Mapping[str, Settings]
 """What is asked of a curve, by the names of questions."""
 Limit = tuple[float, float]
 """Unknowns and seconds of a budget."""
+Numbers = Mapping[Quantity, Number]
+"""Those of a curve by their quantities, and their errors by those of these; None where there is none."""
+Found = TypeVar("Found")
 SOON = 1.0
 """Seconds after which what is known of a curve is kept."""
 UNFINISHED = Message(Code.UNFINISHED)
@@ -71,6 +77,28 @@ class Numerics:
         return ExponentSolver(problem, self.mesh, rtol=self.rtol, budget=self.budget)
 
 
+def refuse_mesh(case: Case) -> None:
+    """Refuse a mesh that cannot be read or made, has too many unknowns, or does not serve the first parameter set.
+
+    Raises:
+        CaseError: it does not.
+    """
+    stated = case.mesh.model_dump(exclude_none=True)
+    try:
+        with np.errstate(all="ignore"):
+            method = Numerics.of(case).solver(next(case.curves()).problem).method if stated else None
+            if isinstance(method, GivenMesh):
+                space, most = method.generators[0].chosen, case.budget.most(method.generators[0].chosen)
+                if space.size > most:
+                    raise MeshError(
+                        f"makes {space.size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
+                        "lower degrees, or a larger [budget]"
+                    )
+    except (MeshError, OSError, ValueError) as failure:
+        place, value = (("mesh", "file"), case.mesh.file) if case.mesh.file else (("mesh",), stated)
+        raise case.refusal(f"got {shown(value)}; {failure}", *place) from None
+
+
 @dataclass(frozen=True)
 class Reason:
     """Why a number is missing.
@@ -87,7 +115,7 @@ class Reason:
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class Entry(Generic[Found]):
     """What became of a question.
 
     Attributes:
@@ -97,13 +125,13 @@ class Entry:
         limit: unknowns and seconds of a budget within which no more is to be found; None where no budget matters.
     """
 
-    found: Any
+    found: Found | None
     reason: Reason | None = None
     seconds: float = 0.0
     limit: Limit | None = None
 
 
-def attempt(solve: Callable[[], Any], symbol: str) -> Any:
+def attempt(solve: Callable[[], Found], symbol: str) -> Found | Reason:
     """What is solved, or the `Reason` why it is missing, which takes nothing else with it."""
     try:
         return solve()
@@ -127,7 +155,7 @@ def fault(failure: Exception) -> Message:
     return Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
 
 
-def idle(*_: Any) -> None:
+def idle(*_: object) -> None:
     """What is called where nobody wants to know."""
 
 
@@ -153,10 +181,10 @@ class Job:
     asked: Asked
     numerics: Numerics
     line: str = ""
-    entries: dict[str, Entry] = field(default_factory=dict)
+    entries: dict[str, Entry[Any]] = field(default_factory=dict)
     rows: dict[float, Sequence[float]] = field(default_factory=dict)
-    new: dict[str, Entry] = field(default_factory=dict)
-    largest: tuple[float, dict[str, Any]] | None = None
+    new: dict[str, Entry[Any]] = field(default_factory=dict)
+    largest: tuple[float, dict[str, object]] | None = None
     pictures: dict[str, Any] = field(default_factory=dict)
     progress: Callable[[], None] = idle
     keep: Callable[[Job], None] = idle
@@ -188,7 +216,7 @@ class Job:
         """What was found; None where that is nothing."""
         return entry.found if (entry := self.entries.get(name)) else None
 
-    def add(self, name: str, entry: Entry) -> None:
+    def add(self, name: str, entry: Entry[Any]) -> None:
         """Take what became of a question."""
         self.entries[name] = self.new[name] = entry
         self.grow()
@@ -203,11 +231,6 @@ class Job:
         if monotonic() - self._kept_at >= SOON:
             self.keep(self)
             self._kept_at = monotonic()
-
-
-def estimated(quantity: Quantity, estimate: Any) -> dict[Quantity, float | None]:
-    """A number and its error by their quantities; None where there is none."""
-    return {quantity: estimate and estimate.value, quantity.error(): estimate and estimate.error_estimate}
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +248,6 @@ class Question:
         lacks: why some of what is asked for is not there.
         numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
         draws: whether files show it of which no record holds the numbers, so that it is solved again for them.
-        names: the pattern of the names of all files about it.
     """
 
     name: str
@@ -235,6 +257,10 @@ class Question:
     symbol: str = ""
     said: Callable[[Any, Curve, Numerics], Iterable[Message]] = lambda *_: ()
     lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
-    numbers: Callable[[Case, CurveResult | None], Mapping[Quantity, Any]] = lambda *_: {}
+    numbers: Callable[[Case, CurveResult | None], Numbers] = lambda *_: {}
     draws: bool = False
-    names: str = ""
+
+    @property
+    def entry(self) -> GenericAlias:
+        """The form of its `Entry`."""
+        return GenericAlias(Entry, (self.kind,))

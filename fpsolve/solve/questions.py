@@ -5,18 +5,17 @@ from __future__ import annotations
 from importlib import import_module
 
 from fpsolve.case.sections import PARTS
-from fpsolve.solve import directions, discretisation, indices, intervals, moments, rate_function
+from fpsolve.solve import discretisation, eigenfunctions, indices, intervals, moments
 from fpsolve.solve.question import Question
 
 QUESTIONS: tuple[Question, ...] = (
     moments.QUESTION,
-    rate_function.QUESTION,
+    moments.RATES,
     *indices.INDEX_QUESTIONS,
-    indices.THEORY,
     moments.CLASSES,
     *(import_module(f"fpsolve.solve.{name}").QUESTION for name in PARTS),
     intervals.QUESTION,
-    directions.QUESTION,
+    eigenfunctions.OF_DIRECTIONS,
     discretisation.QUESTION,
 )
 """Each is solved, said and written in this order."""

@@ -10,12 +10,10 @@ compressed text; nan and inf, which JSON has not, are words as Python writes the
 from __future__ import annotations
 
 import json
-import os
 import zlib
 from base64 import b64decode, b64encode
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from errno import ENOSPC
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -47,14 +45,13 @@ class Records:
         self._end = b""
         if is_fresh:
             path.unlink(missing_ok=True)
-        if path.exists():
-            with path.open("rb") as file:
-                start = 0
-                for line in file:
-                    if found := _parsed(line):
-                        self._starts.setdefault(found[0], []).append(start)
-                    start += len(line)
-                    self._end = b"" if line.endswith(b"\n") else b"\n"
+        with suppress(FileNotFoundError), path.open("rb") as file:
+            start = 0
+            for line in file:
+                if found := _parsed(line):
+                    self._starts.setdefault(found[0], []).append(start)
+                start += len(line)
+                self._end = b"" if line.endswith(b"\n") else b"\n"
 
     def __bool__(self) -> bool:
         return bool(self._starts)
@@ -75,20 +72,16 @@ class Records:
         """Add entries, on a line of their own also where the last one is torn.
 
         Raises:
-            OSError: they cannot be written; nothing is left of them.
+            OSError: they cannot be written; what is left of them is a torn line, which is none.
         """
         content = json.dumps(entries, ensure_ascii=False, default=packed).encode()
         line = b'{"key": "%s", "crc32": %d, "record": %s}\n' % (key.encode(), zlib.crc32(content), content)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("ab", buffering=0) as file:
-            start = file.seek(0, os.SEEK_END)
-            try:
-                if file.write(self._end + line) < len(self._end + line):
-                    raise OSError(ENOSPC, os.strerror(ENOSPC), str(self.path))
-            except OSError:
-                file.truncate(start)
-                raise
-        self._starts.setdefault(key, []).append(start + len(self._end))
+        end, self._end = self._end, b"\n"
+        with self.path.open("ab") as file:
+            start = file.tell() + file.write(end)
+            file.write(line)
+        self._starts.setdefault(key, []).append(start)
         self._end = b""
 
 
@@ -122,19 +115,20 @@ def answered(
         key: what the record of an item is found by.
         keeps: whether something that was found is recorded.
     """
-    by_key, earlier, new = [(key(each), each) for each in items], dict[str, Found](), dict[str, Found]()
-    for name in dict(by_key):
+    named, known = [(key(each), each) for each in items], dict[str, Found]()
+    for name in dict(named):
         with suppress(ValueError):
-            if found := made(kind | None, records.get(name).get("found")):
-                earlier[name] = found
-    fresh = pool.run(task, [item for name, item in dict(by_key).items() if name not in earlier])
-    for name, item in by_key:
-        while name not in earlier and name not in new:
+            if found := made(kind, records.get(name).get("found")):
+                known[name] = found
+    earlier, left = {*known}, {name: item for name, item in named if name not in known}
+    fresh = pool.run(task, left.values())
+    for name, item in named:
+        while name not in known:
             each, one = next(fresh)
-            new[key(each)] = one
+            known[key(each)] = one
             if keeps(one):
-                records.put(key(each), {"found": plain(kind | None, one)})
-        yield item, earlier.get(name) or new[name], name in earlier
+                records.put(key(each), {"found": plain(kind, one)})
+        yield item, known[name], name in earlier
 
 
 def key_of(*content: Any) -> str:
@@ -142,20 +136,20 @@ def key_of(*content: Any) -> str:
     return sha256(json.dumps([__version__, *content], sort_keys=True, default=packed).encode()).hexdigest()[:32]
 
 
-def plain(kind: Any, value: Any) -> Any:
+def plain(kind: object, value: object) -> Any:
     """A value with an annotation as data that a record can hold."""
     return _form(kind).dump_python(value, warnings=False)
 
 
-def made(kind: Any, data: Any) -> Any:
+def made(kind: object, data: object) -> Any:
     """The value with an annotation of what `plain` gave. Raises `ValueError` where that has another form."""
     return _form(kind).validate_python(data)
 
 
 @cache
 def _form(kind: Any) -> TypeAdapter[Any]:
-    """What writes and reads the values with an annotation that is no class by itself, such as `Estimate | None`."""
-    return TypeAdapter(kind, config=ConfigDict(arbitrary_types_allowed=True, extra="forbid"))
+    """What writes and reads the values with an annotation, or None."""
+    return TypeAdapter(kind | None, config=ConfigDict(arbitrary_types_allowed=True, extra="forbid"))
 
 
 def packed(array: FloatArray) -> Entries | float:
@@ -171,4 +165,4 @@ def unpacked(found: Entries) -> Entries | FloatArray:
     if found.keys() != {"shape", "data"}:
         return found
     data = zlib.decompress(b64decode(found["data"]))
-    return np.frombuffer(data, dtype="<f8").reshape(found["shape"]).astype(float)
+    return np.frombuffer(data, dtype="<f8").reshape(found["shape"])

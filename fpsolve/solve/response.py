@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE
-from fpsolve.data import Quantity
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.forced import stationary_moments
 from fpsolve.exponent.method import Budget
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity
-from fpsolve.solve.question import Job, Question, Settings, estimated
+from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity, estimated
+from fpsolve.solve.question import Job, Numbers, Question, Settings
 
 if TYPE_CHECKING:
     from fpsolve.nonlinear.response import StationaryResponse
@@ -38,7 +36,7 @@ def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Bud
         squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
         estimates = [Estimate(value, error, abs(value)) for value, error in squares]
         return CurveResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
-    from fpsolve.nonlinear.response import stationary_response  # which takes a while to import
+    from fpsolve.nonlinear.response import stationary_response  # 390 ms
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
     return CurveResponse(
@@ -74,7 +72,7 @@ def _values_of(noise: Noise, count: int) -> FloatArray:
 
 def _settings(case: Case, number: int) -> Settings | None:
     """The tolerance of the response, which is its own, and the grid of its density if there are few curves."""
-    if not case.has_response:
+    if RESPONSE not in case.asked:
         return None
     grid = case.response.grid
     places = [grid.amplitude, grid.phi, grid.xi] if case.planned <= MOST_GRIDS else None
@@ -86,8 +84,8 @@ def _solve(job: Job, settings: Settings) -> CurveResponse:
     return solve_response(job.curve.problem, settings["rtol"], grid, job.numerics.budget)
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Mapping[Quantity, Any]:
-    about = case.problem.linear.response.numbers if case.has_response else {}
+def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+    about = case.problem.linear.response.numbers if RESPONSE in case.asked else {}
     found = result.response.numbers if result and result.response else {}
     return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
 
@@ -99,5 +97,4 @@ QUESTION: Question = Question(
     CurveResponse,
     RESPONSE,
     numbers=_numbers,
-    names=r"response(_3d)?(-\d+)?\.(csv|vtu|png|pdf)",
 )

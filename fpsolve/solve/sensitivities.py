@@ -40,5 +40,4 @@ QUESTION: Question = Question(
     SENSITIVITIES,
     said=lambda found, *_: found.notes,
     lacks=_lacks,
-    names=r"sensitivities(-\d+)?\.(png|pdf)",
 )

@@ -21,8 +21,8 @@ from fpsolve.exponent.quantities import INDICES
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.solve.curve import NO_MOMENTS, CurveResult
-from fpsolve.solve.moments import CLASSES, Moments
 from fpsolve.solve.moments import QUESTION as MOMENTS
+from fpsolve.solve.moments import Moments
 from fpsolve.solve.question import UNFINISHED, Asked, Entry, Job, Limit, Question, Reason, attempt
 from fpsolve.solve.questions import BY_NAME, QUESTIONS
 
@@ -38,9 +38,8 @@ def everything(case: Case, number: int = 1) -> Asked:
 
 def solve_curve(job: Job) -> Job:
     """Solve what is not known of a parameter set, one after the other; what is missing is an entry with its reason."""
-    planned = [each for each in QUESTIONS if each.symbol and each.name in job.asked]
     p = job.asked[MOMENTS.name]["p"]
-    job.meter.planned = len(p) + len(planned)
+    job.meter.planned = len(p) + sum(bool(BY_NAME[name].symbol) for name in job.asked)
     with job.meter.running():
         if MOMENTS.name not in job.entries:  # moments of even order take little
             attempt(lambda: [job.solver.method.even(each) for each in p], MOMENTS.symbol)
@@ -61,19 +60,20 @@ def solve_curve(job: Job) -> Job:
     return job
 
 
-def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry:
+def _entry(job: Job, question: Question, found: object, seconds: float) -> Entry[object]:
     """What became of a question."""
-    if isinstance(found, Reason):
-        return Entry(None, found, seconds, ANEW if _may_pass(found.message) else job.numerics.limit)
-    said, lacking = question.said(found, job.curve, job.numerics), [*question.lacks(found, job.asked[question.name])]
-    lacking += [each for each in said if each.severity is not Severity.NOTE]
-    limit = job.numerics.limit if lacking else None
-    return Entry(found, None, seconds, ANEW if any(map(_may_pass, lacking)) else limit)
-
-
-def _may_pass(message: Message) -> bool:
-    """Whether a reason may be gone the next time."""
-    return message.tells_of(Code.NO_MEMORY) or message.tells_of(Code.FAULT)
+    reason = found if isinstance(found, Reason) else None
+    if reason:
+        doubts = [reason.message]
+    else:
+        said = question.said(found, job.curve, job.numerics)
+        doubts = [
+            *question.lacks(found, job.asked[question.name]),
+            *(each for each in said if each.severity is not Severity.NOTE),
+        ]
+    may_pass = any(each.tells_of(code) for each in doubts for code in (Code.NO_MEMORY, Code.FAULT))
+    limit = ANEW if may_pass else job.numerics.limit if doubts else None
+    return Entry(None if reason else found, reason, seconds, limit)
 
 
 def solve_set(job: Job) -> Job:
@@ -93,7 +93,7 @@ def result_of(job: Job) -> CurveResult:
     curve, asked, entries = job.curve, job.asked, job.entries
     if (entry := entries.get(MOMENTS.name)) and entry.reason:
         reason = Failure(None, entry.reason.message)
-        return CurveResult(curve, NO_MOMENTS, dict.fromkeys(INDICES), failures=(reason,))
+        return CurveResult(curve, NO_MOMENTS, failures=(reason,))
     known = {name: entry.found for name, entry in entries.items() if name in asked and entry.found is not None}
     moments: Moments = known.get(MOMENTS.name, Moments())
     said: dict[Severity, list[Message]] = {each: [] for each in Severity}
@@ -112,19 +112,12 @@ def result_of(job: Job) -> CurveResult:
     return CurveResult(
         curve=curve,
         moments=job.columns,
-        estimates={name: known.get(name) for name in INDICES},
-        discretisation=known.get("discretisation") or None,
+        parts=known,
         warnings=tuple(said[Severity.WARNING]),
         notes=tuple(said[Severity.NOTE]),
         failures=failures if is_whole else (*failures, Failure(None, UNFINISHED)),
-        classes=known.get(CLASSES.name, ()),
-        parts={name: found for name, found in known.items() if name not in _OWN},
         seconds=sum(entry.seconds for name, entry in entries.items() if name in asked),
     )
-
-
-_OWN = {MOMENTS.name, *INDICES, CLASSES.name, "discretisation"}
-"""Names of questions that have attributes of their own in a result."""
 
 
 def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failure]) -> Iterator[Message]:
@@ -139,13 +132,13 @@ def missing(reasons: Sequence[tuple[Question, Reason]], failures: Sequence[Failu
     failing = Code.INDEX_MISSING if failures else Code.INDEX_FAILED
     groups = dict[tuple[Code, Message, str], list[str]]()
     for question, reason in reasons:
-        message, code = reason.message, codes.get(reason.kind, failing)
-        if question.name in _OWN:
-            message = unsolved.get(message, message) if reason.kind == "failed" else message
-        elif message.severity is not Severity.FAILURE:
+        message, code, is_index = reason.message, codes.get(reason.kind, failing), question.name in INDICES
+        if is_index and reason.kind == "failed":
+            message = unsolved.get(message, message)
+        if is_index or message.severity is Severity.FAILURE:
+            group = "" if is_index else question.name
+            groups.setdefault((code, message, group), []).append(reason.symbol)
+        else:
             yield message
-            continue
-        group = "" if question.name in _OWN else question.name
-        groups.setdefault((code, message, group), []).append(reason.symbol)
     for (code, message, _), symbols in groups.items():
         yield Message(code, symbols=symbols, reason=message)

@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from fpsolve.analysis.target import said
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.errors import FpsolveError
+from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
@@ -40,15 +44,18 @@ def refuse_obstacles(case: Case) -> None:
         FpsolveError: with the curve and the reason.
     """
     processors()
+    stated = case.monte_carlo
     for curve in case.curves():
-        place = f"with {curve.label}: " if curve.varied else ""
+        place = case.vary.line_of(curve.number) + (f"with {curve.label}: " if curve.varied else "")
         try:
             parts = simulated_parts(curve.problem)
         except (FpsolveError, ValueError) as failure:
-            raise FpsolveError(f"{case.path}: {place}{said(failure)}") from None
-        found = obstacles(*parts, time=case.monte_carlo.time, step=case.monte_carlo.step)
-        for name, sentence in found.items():
-            raise FpsolveError(f"{case.path}: monte_carlo.{name}: {place}{sentence}")
+            raise case.refusal(f"{place}{said(failure)}", "monte_carlo") from None
+        for name, sentence in obstacles(*parts, time=stated.time, step=stated.step).items():
+            raise case.refusal(f"{place}{sentence}", "monte_carlo", name)
+        orders = np.array(stated.p or ())
+        if reason := obstacle(curve.base, curve.varied, orders, with_moments=choose(curve.problem).has_pairs):
+            raise case.refusal(f"{place}{reason}", "monte_carlo", "p")
 
 
 def simulate_curve(
@@ -73,40 +80,39 @@ def simulation_of(
         KeyboardInterrupt: nothing was done yet.
         FpsolveError: as `simulate`.
     """
-    from fpsolve.simulation.estimators import simulate
+    from fpsolve.simulation.estimators import simulate  # 310 ms
 
     result = simulate(
         curve.problem, orders, estimator=setting.estimator,
         paths=setting.paths, time=setting.time, step=setting.step, seed=setting.seed, progress=progress,
     )  # fmt: skip
-    if not curve.problem.linear.cubic or result.interrupted:
-        return result, None, result.warnings, result.interrupted
-    from fpsolve.simulation.response import no_simulation, simulated_response
+    response, said, interrupted = None, list[Message](), result.interrupted
+    if curve.problem.linear.cubic and not interrupted:
+        from fpsolve.simulation.response import no_simulation, simulated_response  # 150 ms
 
-    def telling(message: Message, response: Response | None = None, *, interrupted: bool = True) -> Simulation:
-        return result, response, (*result.warnings, message), interrupted
-
-    value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
-    at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
-    if reason := at_rest if value <= SIGNIFICANT * error else no_simulation(curve.problem):
-        for _ in range(2 * PROGRESS_STEPS):
-            progress()
-        return telling(reason, interrupted=False)
-    try:
-        response = simulated_response(
-            curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
-            time=result.time, step=result.step, seed=result.seed, progress=progress,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        return telling(Message(Code.RESPONSE_NOT_REACHED))
-    if response.interrupted:
-        return telling(Message(Code.RESPONSE_STOPPED, time=response.time), response)
-    return result, response, result.warnings, False
+        value, error = result.lyapunov_exponent, result.lyapunov_exponent_error
+        at_rest = Message(Code.AT_REST, value=value, error=error, most=SIGNIFICANT if value > 0 else None)
+        if reason := at_rest if value <= SIGNIFICANT * error else no_simulation(curve.problem):
+            said.append(reason)
+            for _ in range(2 * PROGRESS_STEPS):
+                progress()
+        else:
+            try:
+                response = simulated_response(
+                    curve.problem, value, result.variance_rate, paths=max(result.paths // 8, 32),
+                    time=result.time, step=result.step, seed=result.seed, progress=progress,
+                )  # fmt: skip
+                interrupted = response.interrupted
+                said += [Message(Code.RESPONSE_STOPPED, time=response.time)] * interrupted
+            except KeyboardInterrupt:
+                interrupted = True
+                said.append(Message(Code.RESPONSE_NOT_REACHED))
+    return result, response, (*result.warnings, *said), interrupted
 
 
 def form_of_record() -> Any:
     """The form of a simulation in its record, see `SimulatedCurve`."""
-    from fpsolve.simulation import MonteCarlo, Response
+    from fpsolve.simulation import MonteCarlo, Response  # 460 ms
 
     return tuple[MonteCarlo, Response | None, tuple[Message, ...], bool]
 

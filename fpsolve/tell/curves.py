@@ -14,7 +14,7 @@ import numpy as np
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import EXCURSIONS
+from fpsolve.case.sections import EXCURSIONS, RESPONSE
 from fpsolve.data import short_names, written
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
@@ -163,7 +163,7 @@ def _numbers(case: Case, result: CurveResult) -> Cells:
         level = min(case.excursions.levels, key=lambda each: abs(math.log(each / 10)))
         bounds = bounds_text(result.excursion, level) if result.excursion else ""
         yield Column(f"P(sup ‖x‖ ≥ {level:g})", 1), bounds
-    if case.has_response:
+    if RESPONSE in case.asked:
         means = case.problem.linear.response.means
         for name in {"amplitude_squared"} & means.keys() or means:
             yield Column(means[name].symbol, 1), short(result.response.means[name]) if result.response else ""

@@ -65,7 +65,7 @@ MOST_EQUATIONS = 6
 """Lines of the equations of motion that the page shows; more would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
-NUMBERS = {MOMENT.name, *INDICES, "theory", "classes", "discretisation"}
+NUMBERS = {MOMENT.name, *INDICES, "classes", "discretisation"}
 """The parts that are solved."""
 
 

@@ -18,7 +18,7 @@ from fpsolve.drawing import figure_for, label_axes, plain_numbers
 from fpsolve.measured import NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
-from fpsolve.solve.noise import SIGNAL_WORDS, Critical, NoiseOutcome, density_of
+from fpsolve.solve.noise import Critical, NoiseOutcome, density_of
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.text import likely, sampled
@@ -70,7 +70,7 @@ def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
 def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
     """noise.png and .pdf: what was measured with its 95 % interval, what was fitted, the frequencies that matter."""
     fit, noise_in = outcome.fit, outcome.wanted.noise_in
-    spectrum, words = fit.spectrum, SIGNAL_WORDS[noise_in]
+    spectrum, words = fit.spectrum, SIGNALS[noise_in].words
     paths = [folder / f"noise.{ending}" for ending in ("png", "pdf")]
     factor, x = shown.factor, shown.frequency(spectrum.frequencies)
     fine = np.geomspace(spectrum.frequencies[0], spectrum.frequencies[-1], 400)
@@ -115,7 +115,7 @@ def misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid:
     fit, noise_in = outcome.fit, outcome.wanted.noise_in
     headings = "", f"{shown.symbol} ({shown.per})", "S fitted", "± s.e.", "measured/fitted"
     unit = "s" if noise_in == "stiffness" else "1/s"
-    remark = f"S of the {SIGNAL_WORDS[noise_in]}, two-sided, in {unit}; G = {shown.factor:.4g} S as in the figure"
+    remark = f"S of the {SIGNALS[noise_in].words}, two-sided, in {unit}; G = {shown.factor:.4g} S as in the figure"
     title = f"{source.name}: where stability depends on the noise"
     grid = Grid(title, [*map(Column, headings), Column("± s.e.", 1)], remark=remark)
     values, errors = density_of(fit, [each.omega for each in fit.misfit])
@@ -163,5 +163,5 @@ def _missing(outcome: NoiseOutcome) -> str:
 
 def _percent(each: Critical) -> str:
     """A damping ratio in percent with two digits of its error."""
-    value, error = 100 * each.value, 100 * each.standard_error
+    value, error = (100 * number for number in each)
     return f"({sampled(value, error)} ± {error:.1g}) %" if error else f"{value:.4g} %"

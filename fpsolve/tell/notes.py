@@ -14,14 +14,14 @@ from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.tell.blocks import WORDS, Note
 from fpsolve.tell.text import EACH, NAMED, NOTES
 
-SUMMARY = "summary.json"
+CURVES = "curves.csv"
 """The file of all messages of a run."""
 MONTE_CARLO = "monte_carlo*.json"
 """The files of all messages of a simulation."""
 
 
 def notes(
-    case: Case, found: Iterable[CurveResult | SimulatedCurve], file: str = SUMMARY, *, count: int | None = None
+    case: Case, found: Iterable[CurveResult | SimulatedCurve], file: str = CURVES, *, count: int | None = None
 ) -> Iterator[Note]:
     """What is said of the curves of a case: of whom, what, whose numbers these are, where the others are.
 

@@ -58,7 +58,7 @@ class Watch:
         shown: takes what was found once it is there; it is made when it is asked for.
         noted: takes what limits this.
         said: takes notes about files.
-        has_report: whether report.html is written, too.
+        has_report: whether a report is written, too.
         is_whole: whether a few of several curves are also shown one by one, with Λ at each p.
     """
 

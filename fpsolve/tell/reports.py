@@ -1,4 +1,4 @@
-"""Writing report.html, which comes last: where it fails all other files are there."""
+"""Writing a report, which comes last: where it fails all other files are there."""
 
 from __future__ import annotations
 
@@ -21,20 +21,16 @@ from fpsolve.files import writable, write_text
 from fpsolve.messages import Code, Message
 from fpsolve.model.equation import equations_of
 from fpsolve.model.problem import Problem
-from fpsolve.results.tables import facts_of
+from fpsolve.results.csv_json import facts_of
 from fpsolve.tell.blocks import TONES, WORDS, Block, Column, Drawing, Sentence, filled
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.progress import Phase, Watch
 from fpsolve.tell.text import EACH
 
-REPORT = "report.html"
-"""The file of a report."""
 COMPLETE = "Complete."
 """The state of a run that did all."""
 INCOMPLETE = "Not complete: the run ended early, and this is what was done."
 """The state of a run that ended early."""
-_OTHERS = "summary.json", "monte_carlo.json", "chart.json", "design.json", "proof.json"
-"""What a command says that it has done."""
 
 
 def write_report(
@@ -46,6 +42,7 @@ def write_report(
     started: datetime,
     files: Sequence[str],
     complete: bool,
+    name: str = "report.html",
 ) -> None:
     """Write the report of what a command found into a folder, if one is wanted; a fault in that is said and no more.
 
@@ -54,26 +51,25 @@ def write_report(
         started: when the command was.
         files: the names of those that hold all numbers.
         complete: whether all was done that was planned.
+        name: of the file.
 
     Raises:
         OutputError: it cannot be written.
     """
     if not watch.has_report:
         return
-    others = [name for name in _OTHERS if name not in files and (folder / name).is_file()]
-    also = f" Other commands wrote {', '.join(others)} there; their own --report shows it." if others else ""
     with watch.bar(Phase(case.name, "report")), writable(folder):
         try:
             state = COMPLETE if complete else INCOMPLETE
-            more = f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}.{also}"
+            more = f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}."
             text = page_of(case, blocks, started, state=state, file=case.path.name, more=more)
         except OSError:
             raise
         except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
-            message = Message(Code.NO_REPORT, kind=type(failure).__name__, text=str(failure))
+            message = Message(Code.NO_REPORT, file=name, kind=type(failure).__name__, text=str(failure))
             watch.said([note_on(case.name, message)])
         else:
-            write_text(folder / REPORT, text)
+            write_text(folder / name, text)
 
 
 @contextmanager

@@ -7,7 +7,6 @@ from itertools import chain
 from pathlib import Path
 
 from fpsolve.case.case import Case
-from fpsolve.results.columns import table_of
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.tell import curves
@@ -33,7 +32,7 @@ def show(
         table: the numbers of all curves, if these are known already.
         is_whole: whether also a few of several curves are told of one by one, and Λ(p) at each of many p.
     """
-    table = table_of(case, results) if table is None else table
+    table = Table(case, results) if table is None else table
     yield from verdicts(case, results, table)
     yield main_figure(case, results, simulated, table)
     yield rate_figure(case, results)

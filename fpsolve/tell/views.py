@@ -43,7 +43,7 @@ PATHS, POINTS = 10, 400
 
 def refusal(failure: ValidationError, fields: Mapping[str, FieldInfo]) -> FpsolveError:
     """What is said of the values of a question."""
-    return FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure, fields)))
+    return FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure.errors(), fields)))
 
 
 def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
@@ -90,7 +90,7 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
             yield found
 
     chart, begun = Chart((), ()), begun_lines(case)
-    for chart in solve_chart(case, begun, scans(), has_closed_forms=False):
+    for chart in solve_chart(begun, scans()):
         tell(answer(chart))
     grid.clear()
     return answer(chart)

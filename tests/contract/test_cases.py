@@ -131,9 +131,9 @@ def test_expected_values_of_weak_noise_are_those_of_the_paper(name):
     for each in (each for each in case.expect if not each.of_response):
         [curve] = [curve for curve in case.curves() if each.selects(curve.varied)]
         theory = getattr(perturbation, "moment_exponent" if each.quantity == "moment" else each.quantity)
-        value = theory(curve.oscillator, curve.noise, *([] if each.p is None else [each.p]))
+        value = theory(curve.problem.system, curve.noise, *([] if each.p is None else [each.p]))
         is_theory = "second order" in each.source
-        if case.oscillator.epsilon <= 0.1:
+        if case.system.epsilon <= 0.1:
             assert each.value == pytest.approx(value, rel=1e-9 if is_theory else 1.5e-3)
         else:
             assert not is_theory
@@ -221,11 +221,8 @@ def test_fig3_frequency_lowers_and_noise_raises_the_largest_exponent():
 def test_almost_sure_stability_ends_where_the_paper_says(name, key):
     """Stable for r < 1 − π(S(2ω) + 4c1)/8ω and for c1 < −S(2ω)/4 + 2ω(1 − r)/π, by Eq. (39)."""
     case = load_case(CASES / f"{name}.toml")
-    curve = case.curve({})
-    oscillator, strength = (
-        curve.oscillator,
-        perturbation.reduced(curve.noise).spectral_density(2 * curve.oscillator.omega),
-    )
+    oscillator = case.system
+    strength = perturbation.reduced(case.noise).spectral_density(2 * oscillator.omega)
     end = {
         "fig5": 1 - math.pi * (strength + 4 * oscillator.c1) / (8 * oscillator.omega),
         "fig6": -strength / 4 + 2 * oscillator.omega * (1 - oscillator.restitution) / math.pi,

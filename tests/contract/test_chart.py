@@ -163,6 +163,10 @@ def test_an_interrupted_chart_goes_on_to_the_same_lines_and_a_whole_one_solves_n
 
 
 @pytest.mark.slow
+def test_what_only_other_commands_use_does_not_keep_a_case_from_being_read(tmp_path):
+    assert case_in(tmp_path, CASE, ["chart.x.key='none'", "monte_carlo.step=9.0", "mesh.xi_max=100.0"]).planned == 1
+
+
 def test_a_map_and_a_chart_of_the_same_keys_share_a_folder(tmp_path):
     sets = ["vary.oscillator.omega=[1.0, 2.0]", "vary.noise.D0=[0.1, 0.2]", "chart.lines=['moment(2) = 0']"]
     sets += [

@@ -51,7 +51,7 @@ ROWS = [
         "--help",
         0,
         "linear systems under random loads … [system] … 0 success … 1 a checked value differs or a design is out of "
-        "reach … 2 bad input … 3 not converged … 130 interrupted",
+        "reach … 2 bad input … 3 not converged … 130 interrupted … 143 terminated",
         "",
     ),
     *((f"{name} --help", 0, f"Example: fpsolve {name} … {UNITS}", "") for name in ("run", "check")),
@@ -263,29 +263,27 @@ def test_an_output_in_ascii_has_question_marks_for_greek(tmp_path):
 
 
 MAIN = "import sys; from fpsolve.cli import main; sys.exit(main(sys.argv[1:]))"
-GONE = f"import os, shutil; shutil.rmtree(os.getcwd()); {MAIN}"
 FULL = "the output cannot be written: No space left on device; send it to another place\n"
 
 
 @pytest.mark.parametrize(
-    ("code", "arguments", "stdout", "left"),
+    ("arguments", "stdout", "left"),
     sampled(
-        (MAIN, f"run case.toml {FAST}", "full", (2, FULL)),
-        (MAIN, "check case.toml", "closed", (141, "")),
-        (GONE, "check case.toml", None, (2, "the working folder does not exist any more; change to another folder\n")),
-        (MAIN, "--help", "full", (2, FULL)),
-        (MAIN, "mesh a.vtu", "full", (2, FULL)),
-        (MAIN, "--version", "closed", (141, "")),
+        (f"run case.toml {FAST}", "full", (2, FULL)),
+        ("check case.toml", "closed", (141, "")),
+        ("--help", "full", (2, FULL)),
+        ("mesh a.vtu", "full", (2, FULL)),
+        ("--version", "closed", (141, "")),
     ),
 )
 @pytest.mark.parametrize("unbuffered", sampled("", "1"))
-def test_an_output_that_cannot_be_written_is_one_sentence(tmp_path, code, arguments, stdout, left, unbuffered):
+def test_an_output_that_cannot_be_written_is_one_sentence(tmp_path, arguments, stdout, left, unbuffered):
     (tmp_path / "case.toml").write_text(TEXT, encoding="utf-8")
     read, write = os.pipe()
     os.close(read)
     with Path("/dev/full" if stdout == "full" else f"/dev/fd/{write}").open("w", encoding="utf-8") as stream:
         done = subprocess.run(
-            [sys.executable, "-c", code, *shlex.split(arguments)], stdout=stream if stdout else subprocess.PIPE,
+            [sys.executable, "-c", MAIN, *shlex.split(arguments)], stdout=stream,
             stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path, timeout=100,
             env=os.environ | {"PYTHONUNBUFFERED": unbuffered},
         )  # fmt: skip
@@ -305,16 +303,8 @@ def test_errors_that_cannot_be_written_keep_the_exit_code(tmp_path, arguments, c
     assert (tmp_path / "results/case/results.nc").exists() == (code == 0)
 
 
-@pytest.mark.parametrize(
-    ("name", "before"),
-    sampled(
-        ("SIGTERM", heed_signals),
-        ("SIGHUP", heed_signals),
-        ("SIGTERM", lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN)),
-        keep=0,
-    ),
-)
-def test_a_signal_ends_a_run_that_keeps_what_it_has(tmp_path, name, before):
+@pytest.mark.parametrize("before", sampled(heed_signals, lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN), keep=0))
+def test_a_sigterm_ends_a_run_that_keeps_what_it_has(tmp_path, before):
     """As Ctrl-C does; a SIGHUP that nohup has it ignore does not end it."""
     (tmp_path / "case.toml").write_text(TEXT, encoding="utf-8")
     many = f"run case.toml {FAST} --jobs 1 --set vary.noise.D0={{start=0.1,stop=1.0,num=5000}}"
@@ -326,22 +316,16 @@ def test_a_signal_ends_a_run_that_keeps_what_it_has(tmp_path, name, before):
                 process.send_signal(signal.SIGHUP)
                 with pytest.raises(subprocess.TimeoutExpired):
                     process.wait(timeout=0.5)
-            process.send_signal(getattr(signal, name))
+            process.send_signal(signal.SIGTERM)
             _, err = process.communicate(timeout=60)
         finally:
             process.kill()
-    assert process.returncode == 128 + getattr(signal, name)
+    assert process.returncode == 143
     assert re.search(
         r"^interrupted after [1-9]\d* of 5000 curves; what was done is kept in results/case; run it again", err, re.M
     )
     assert "Traceback" not in err
     assert files(tmp_path / "results/case") >= TABLES
-
-
-def test_handlers_of_signals_are_as_before_a_command(tmp_path):
-    before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)]
-    assert run(tmp_path, "--version").code == 0
-    assert [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM)] == before
 
 
 START = """

@@ -173,7 +173,7 @@ REFUSED = [
     ({"oscillator.epsilon": 900.0, "oscillator.restitution": 0.01}, {}, "overflow"),
     ({}, {"axes": [SIDE, SIDE]}, "both axes"),
     ({}, {"axes": [SIDE, {"key": "noise.D0"}]}, "missing"),
-    ({}, {"axes": [SIDE, {**SIDE, "key": "none"}]}, "got none as an axis"),
+    ({}, {"axes": [SIDE, {**SIDE, "key": "none"}]}, 'y.key: got "none"; must be one of'),
     ({}, {"axes": None}, "x"),
     ({}, {"p": "two"}, "got p = 'two'"),
     ({}, {"p": 10**400}, "got p = 1000"),

@@ -83,7 +83,10 @@ def test_spectrum_becomes_a_case_and_a_verdict_by_the_averaged_formulas(tmp_path
     assert values == pytest.approx({**oscillator, "noise.alpha": 12.0, "noise.sigma": 0.15 * OMEGA**2}, rel=1e-4)
     assert 'kind = "ornstein-uhlenbeck"' in printed
     assert "the mean square decays with a probability of > 99.9 %" in printed
-    assert files(tmp_path / "results/m.csv") == {f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")}
+    assert files(tmp_path / "results/m.csv") == {
+        *(f"noise.{ending}" for ending in ("json", "png", "pdf", "toml")),
+        "records/files.txt",
+    }
 
 
 def test_lambda_within_its_standard_error_of_0_decides_nothing(tmp_path):
@@ -270,7 +273,7 @@ REFUSED = {
     "--record record.csv --sided one --frequency 2": "is for a spectrum",
     "m.csv --sided two --frequency 2 --record record.csv": "state another sided",
     f"{FILE} --case my.toml": "has its noise in the damping",
-    f"{FILE} --case my.toml --damping-ratio 0.1": "leave out --damping-ratio",
+    f"{FILE} --case my.toml --damping-ratio 0.1": "which --case states; leave it out",
     "peaks.csv --sided one --frequency 2 --frequency 6": "take another kind, such as filter",
     f"{GROUND} --record record.csv": "in place of a file",
     f"{GROUND} --scale 0": "state another --scale",

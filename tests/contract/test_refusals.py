@@ -33,8 +33,10 @@ PIPE = "is a pipe or a device, not a file; write the case into a file and name t
         ("pipe.toml", f"pipe.toml: {PIPE}"),
         ("huge.toml", f"has {2**40} bytes, and a case file has at most {2**22}; name another, such as fig1.toml"),
         ("good.toml/case.toml", "cannot be read (Not a directory); check its name and permissions"),
-        *((f"{name}.toml", "must have no control characters") for name in (".", "..", "a\x1b[31m", "a\u202eb")),
-        ("mi\nne.toml", r"got 'mi\nne.toml'; a file's name may have no line ends"),
+        *(
+            (f"{name}.toml", "must have no control characters")
+            for name in (".", "..", "a\x1b[31m", "a\u202eb", "mi\nne")
+        ),
         (
             "piped.toml",
             "vary.file: pipe.toml: is a pipe or a device, not a file; write the sets into a file and name that",
@@ -48,7 +50,7 @@ def test_what_is_no_case_file_is_refused(tmp_path, name, words):
     (tmp_path / "huge.toml").touch()
     os.truncate(tmp_path / "huge.toml", 2**40)
     texts = {"good.toml": GOOD, "piped.toml": f"{GOOD}vary.file = 'pipe.toml'", "folder.toml": f"{GOOD}vary.file = '.'"}
-    texts |= {name: GOOD} if "must" in words or "line ends" in words else {}
+    texts |= {name: GOOD} if "must" in words else {}
     texts = {key: text.replace("vary.", "[vary]\n") for key, text in texts.items()}
     done = run(tmp_path, "run", name, **texts)
     assert (done.code, done.out) == (2, "")
@@ -88,7 +90,7 @@ def test_a_number_of_processors_that_is_none_is_refused(tmp_path, monkeypatch):
 def test_an_override_that_is_no_text_is_refused(tmp_path, override):
     with pytest.raises(CaseError, match=r"is no text; write it as in --set oscillator\.omega=2\.0"):
         case_in(tmp_path, GOOD, [override])
-    with pytest.raises(TypeError, match="got 5; must be the path of a case file"):
+    with pytest.raises(TypeError, match="got path = 5; must be the path of a case file"):
         load_case(5)
 
 
@@ -134,20 +136,18 @@ def signed(low, high):
         {name: powers(-15, 15) for name in ("omega", "D0", "tau0")}
         | {"epsilon": powers(-12, 6), "c1": signed(-300, 15), "restitution": powers(-300, 0)}
         | {"r0": st.floats(-1e6, 1.66) | signed(-16, -0.3).map(lambda part: 1 - part), "p": signed(-300, 308)}
-        | {"time": powers(-300, 308), "step": powers(-300, 308)}
     ),
     treatment=st.sampled_from(["exact", "ou-reduction"]),
 )
 def test_any_parameters_in_their_ranges_give_a_case_or_a_refusal(tmp_path, numbers, treatment):
-    text = f"{GOOD}step = 0.1\n".replace("ou-reduction", treatment)
+    text = GOOD.replace("ou-reduction", treatment)
     for key, value in numbers.items():
         stated = f"[{value!r}]" if key == "p" else repr(value)
         text, count = re.subn(rf"^{key} = .*", f"{key} = {stated}", text, flags=re.MULTILINE)
         assert count == 1
-    places = {"oscillator", "moments", "monte_carlo.p", "monte_carlo.time", "monte_carlo.step"}
     try:
         [curve] = case_in(tmp_path, text).curves()
         found = {"moments"} if curve.problem else set()
     except CaseError as error:
         found = {fault.key for fault in error.faults}
-    assert set() < found <= places
+    assert set() < found <= {"oscillator", "moments"}

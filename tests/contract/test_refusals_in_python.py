@@ -115,12 +115,19 @@ def lagging():
 WALLED = "at a wall of more than two variables"
 NUMBERS = "both must be finite"
 ROWS = "two rows of two finite numbers"
+
+
+def spelled(value):
+    """A value as messages write it."""
+    return re.escape(repr(value).replace("'", '"').lower())
+
+
 BAD = [
     # Noises
     *(
         (
             lambda each=each: noise(**dict([each])),
-            f"^NonGaussianNoise: {each[0]}: got {re.escape(repr(each[1]))}; must be a finite number >= .*",
+            f"^NonGaussianNoise: {each[0]}: got {spelled(each[1])}.*; must be a finite number >= .*",
         )
         for each in (
             ("D0", 0.0),
@@ -134,14 +141,14 @@ BAD = [
     ),
     (
         lambda: NonGaussianNoise(D0=-1.0, tau0=math.nan, r0=0.9),
-        rf"D0: got -1\.0; {SIZE} \(noise intensity, in 1/time\)\n.*tau0: got nan; {SIZE} \(correlation time,",
+        rf"D0: got -1\.0; {SIZE} \(noise intensity, in 1/time\); write.*\n.*tau0: got nan; {SIZE} \(correlation time,",
     ),
     (
         lambda: NonGaussianNoise(tau0=1.0, r0=0.9, DO=1.0),
         rf"D0: missing; {SIZE} .*\n.*DO: unknown; the parameters are D0, tau0, r0$",
     ),
-    (lambda: NonGaussianNoise(10**5000, 1.0, 0.9), "D0: got a number too long to show; must"),
-    (lambda: NonGaussianNoise(1.0, [0.5] * 99, 0.9), r"tau0: got \[(0\.5, ){11}0\.\.\.; must"),
+    (lambda: NonGaussianNoise(10**5000, 1.0, 0.9), "D0: got a value too long to show .*; must"),
+    (lambda: NonGaussianNoise(1.0, [0.5] * 99, 0.9), r"tau0: got \[(0\.5, ){11}0\.\.\. \(a list\); must"),
     (
         lambda: NonGaussianNoise(1.0, 1.0, 0.9, 2.0),
         "^NonGaussianNoise: argument 4: unknown; the parameters are D0, tau0, r0$",
@@ -170,7 +177,7 @@ BAD = [
     *(
         (
             lambda each=each: paper(**dict([each])),
-            f"^VibroImpactOscillator: {each[0]}: got {re.escape(repr(each[1]))}; must be (a finite number|one of) .*",
+            f"^VibroImpactOscillator: {each[0]}: got {spelled(each[1])}.*; must be (a finite number|one of) .*",
         )
         for each in (
             ("omega", 0.0),
@@ -339,6 +346,23 @@ def test_call_is_refused_in_words(call, words):
 def test_noise_so_strong_or_slow_that_moments_have_too_many_functions_is_refused():
     with pytest.raises(FpsolveError, match="noise so strong or slow"):
         even_moment(Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeck(1e-3, 1.0)), 4.0)
+
+
+ARGUMENTS = {
+    "pair": fpsolve.tilted_density,
+    "case": fpsolve.run,
+    "out": lambda x: fpsolve.run("x", x),
+    "progress": lambda x: fpsolve.run("x", progress=x),
+    "overrides": lambda x: fpsolve.load_case("x", x),
+    "interval": lambda x: fpsolve.MomentLyapunovFunction(driven(itself), x),
+    "by": lambda x: fpsolve.design(driven(itself), "moment(2) = 0", x),
+}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_an_argument_of_another_type_is_named_in_one_sentence(name):
+    with pytest.raises(TypeError, match=rf"^got {name} = 3; must be .*\Z"):
+        ARGUMENTS[name](3)
 
 
 CALLS = [

@@ -128,7 +128,7 @@ def test_of_many_curves_the_extreme_and_the_first_failed_ones_have_a_row(tmp_pat
         failures.replace("(", "", 1),
     )
     assert re.fullmatch(
-        r"warning: case: 22 of 60 curves: rtol = 1e-08 is not met by λ: .*; most for .* = \S+ \(all in summary.json\)",
+        r"warning: case: 22 of 60 curves: rtol = 1e-08 is not met by λ: .*; most for .* = \S+ \(all in curves.csv\)",
         warnings,
     )
 
@@ -157,7 +157,7 @@ def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
     few = notes(run(tmp_path, *asked, case=TEXT).err)
     assert few.count("note: ") == 1
     assert few.startswith(f"note: case, noise.D0 = 0.5 and noise.D0 = 1: {weak}: do not rely on it from |p| = 2 on")
-    assert few.endswith("; most for noise.D0 = 1 (all in summary.json)\n")
+    assert few.endswith("; most for noise.D0 = 1 (all in curves.csv)\n")
     many = run(tmp_path, *asked, "--set", "vary.noise.D0={start=0.3, stop=1.0, num=12}").err
     assert weak not in many  # a table of many curves has no column of it
     assert "perturbation theory, Eq. (37)" not in run(tmp_path, "check", *asked[1:]).err
@@ -242,7 +242,7 @@ def page_of(folder, *options, text=BURSTS, command="run", out="results/case"):
     with painted():
         done = run(folder, command, "case.toml", "--report", *options, case=text)
     assert done.code == 0, done
-    page = Page(folder / out / "report.html")
+    page = Page(folder / out / REPORTS[command])
     page.text = " ".join(page.text.split())
     return page
 
@@ -277,21 +277,27 @@ def test_the_report_is_one_safe_file_with_equation_numbers_meanings_pictures_and
     assert html.escape(NASTY, quote=False) in page.source
 
 
-@pytest.mark.parametrize("command", sampled("run", "simulate", "chart", "prove"))
-def test_a_report_goes_with_what_it_reported(tmp_path, command):
-    """Whatever is done next in a folder, also for the same parameters."""
+REPORTS = {"run": "report.html", "simulate": "monte_carlo.html", "chart": "chart.html", "prove": "proof.html"}
+PLANE = """
+[chart]
+x = { key = "oscillator.c1", start = 0.05, stop = 0.1 }
+y = { key = "noise.D0", start = 0.1, stop = 0.2 }
+lines = ["moment(2) = 0"]
+"""
+
+
+@pytest.mark.parametrize("command", sampled(*REPORTS))
+def test_a_report_goes_with_what_it_reported_and_no_other_command_removes_it(tmp_path, command):
     if command == "prove":
         pytest.importorskip("flint")
-    text = BURSTS if command == "chart" else TEXT
+    few = ["--quiet", "--set=monte_carlo={ paths=64, time=40.0 }", "--set=vary={}", "--set=output={figure=false}"]
     (tmp_path / "results/case").mkdir(parents=True)
-    for name in ("report.html", "reports.html"):
-        (tmp_path / "results/case" / name).write_text("earlier", encoding="utf-8")
-    few = ["--set=monte_carlo={ paths=64, time=40.0 }", "--set=vary={}", "--set=output={figure=false}"]
-    plane = "[chart]\nx={key='system.zeta', start=0.05, stop=0.1}\ny={key='noise.a', start=0.1, stop=0.2}\n"
-    plane += "lines=['moment(2) = 0']\n"
-    run(tmp_path, command, "case.toml", *(few if command != "chart" else []), case=text + plane * (command == "chart"))
-    assert "reports.html" in files(tmp_path / "results/case")
-    assert "report.html" not in files(tmp_path / "results/case")
+    (tmp_path / "results/case/reports.html").write_text("mine", encoding="utf-8")
+    for name, is_there in ((command, True), ("simulate" if command == "run" else "run", True), (command, False)):
+        report = ["--report"] * (name == command and is_there)
+        assert run(tmp_path, name, "case.toml", *few, *report, case=TEXT + PLANE).code == 0
+        pages = {each for each in files(tmp_path / "results/case") if each.endswith(".html")}
+        assert pages == {"reports.html", *[REPORTS[command]] * is_there}
 
 
 @pytest.mark.slow
@@ -313,9 +319,8 @@ def test_a_proof_is_on_the_page_and_stays_beside_a_run(tmp_path):
     moment = ["--set=output={ quantities=['moment'], figure=false }", "--set=excursions={}", "--set=moments.p=[2.0]"]
     page = page_of(tmp_path, "--width", "0.01", *moment, command="prove")
     assert "Proven: the moment of order 2 grows." in page.text
-    page = page_of(tmp_path, *moment)
-    assert "Other commands wrote proof.json there" in page.text
-    assert "The mean square grows" in page.text
+    assert "The mean square grows" in page_of(tmp_path, *moment).text
+    assert "proof.html" in files(tmp_path / "results/case")
 
 
 def spring(force="", noise=None, rate="v"):

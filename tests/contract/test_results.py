@@ -160,6 +160,11 @@ def test_a_missing_number_says_why():
     assert still._repr_html_().startswith("<p>none: ")
 
 
+def test_nobody_writes_into_the_arrays_of_results(results):
+    found = [each for result in (*results.values(), results["curve"].moments) for each in vars(result).values()]
+    assert {each.flags.writeable for each in found if isinstance(each, np.ndarray)} == {False}
+
+
 def same(found, name, values, error=None):
     np.testing.assert_array_equal(found[name], values)
     if error is not None:

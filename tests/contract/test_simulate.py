@@ -15,7 +15,7 @@ from fpsolve import load_case, lyapunov_exponent
 from fpsolve.commands import run_case, simulate_case
 from fpsolve.tell import Watch
 from tests.conftest import started
-from tests.kit import case_in, case_text, read_csv, read_json, run
+from tests.kit import case_in, case_text, put, read_csv, read_json, run
 
 SECTIONS = "[moments]\np = [-1.0, 1.0]\n[monte_carlo]\npaths = 6400\ntime = 40.0\nseed = 7\n"
 CASE = case_text(SECTIONS, epsilon=0.5)
@@ -95,10 +95,8 @@ def test_each_curve_has_its_file_and_those_of_an_earlier_simulation_go(tmp_path)
 
 def test_a_simulation_that_ends_before_it_has_anything_leaves_nothing_of_an_earlier_one(tmp_path):
     place = tmp_path / "results/test"
-    place.mkdir(parents=True)
-    earlier = "monte_carlo.json", "monte_carlo-2.json", "monte_carlo_response.png", "summary.json", "density.vtu"
-    for name in (*earlier, "notes.txt"):
-        (place / name).write_text("{}")
+    put(place, "run", "monte_carlo.json", "monte_carlo_response.png", "summary.json", "density.vtu")
+    (place / "notes.txt").touch()
     with pytest.raises(KeyboardInterrupt, match="interrupted after 0 of 1 curve; run it again to go on"):
         simulate_case(case_in(tmp_path, CASE), tmp_path / "results", watch=interrupted(0))
     assert {path.name for path in place.iterdir()} == {"notes.txt", "records"}

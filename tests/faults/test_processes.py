@@ -62,7 +62,8 @@ def test_what_is_no_number_of_processes_is_refused(case, tmp_path, monkeypatch, 
         pytest.importorskip("distributed")
     monkeypatch.setenv("FPSOLVE_PROCESSORS", limit)
     varied = load_case(case, ['vary={"noise.D0"=[0.1,0.2,0.3]}'])
-    with pytest.raises(FpsolveError, match=said):
+    kind = FpsolveError if isinstance(jobs, int | None) and jobs is not True else TypeError
+    with pytest.raises(kind, match=said):
         fpsolve.run(varied, tmp_path / "out", jobs=jobs, scheduler=scheduler)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from fpsolve.exponent.error import Estimate, Failure
 from fpsolve.exponent.quantities import INDICES
-from fpsolve.results.columns import table_of
+from fpsolve.results import Table
 from fpsolve.solve.curve import CurveResult, MomentColumns
 from fpsolve.tell.figures import coloured_by, main_figure
 from fpsolve.theory.perturbation import second_order
@@ -53,7 +53,7 @@ def drawn(pictures, monkeypatch, tmp_path):
             told = () if p.size else (Failure(None, "it was too hard"),)
             columns = MomentColumns(p, value, slope, nothing, nothing, nothing, value)
             results.append(CurveResult(curve, columns, dict.fromkeys(INDICES) | known, failures=told))
-        main_figure(case, results, [], table_of(case, results)).write(tmp_path)
+        main_figure(case, results, [], Table(case, results)).write(tmp_path)
         return figures[-1]
 
     monkeypatch.setattr(matplotlib.figure, "Figure", Recorded)

@@ -84,7 +84,7 @@ def test_cluster_without_workers_is_given_up_after_a_while(monkeypatch):
 
 @pytest.mark.slow
 def test_workers_are_as_many_as_tasks_with_one_processor_each_after_own_work(monkeypatch):
-    with parallel(1000, 2) as workers:
+    with parallel(2) as workers:
         found = set(dict(workers.run(whereabouts, range(20))).values())
     assert (len(found), {count for _, count in found}) == (2, {1})
     monkeypatch.setattr(pool, "START_SECONDS", 0.1)

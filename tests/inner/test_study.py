@@ -12,7 +12,7 @@ from fpsolve.commands import run_case
 from fpsolve.errors import NotConverged
 from fpsolve.exponent import INDICES
 from fpsolve.messages import message_of
-from fpsolve.results import columns
+from fpsolve.results import Table, table
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
 from fpsolve.solve import QUESTIONS, indices, simulate
@@ -32,7 +32,7 @@ def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabula
     index, chance = names["index"], names["question"]
     question = indices.question_of(index)
     monkeypatch.setitem(INDICES, index.name, index)
-    for module in (solve, columns):
+    for module in (solve, table):
         monkeypatch.setattr(module, "QUESTIONS", (*QUESTIONS, question, chance))
     for each in (question, chance):
         monkeypatch.setitem(solve.BY_NAME, each.name, each)
@@ -43,8 +43,8 @@ def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabula
     expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * case.problem.noise.standard_deviation))
     for result in (solved.result, from_record(case, solved.result.curve, read_again(solved.record))):
         assert result.parts[chance.name].value == pytest.approx(expected, rel=1e-8)
-        row, solver = columns.row_of(case, result), ExponentSolver(case.problem)
-        assert {each.name for each in columns.columns_of(case)} >= {index.name, f"{index.name}_error", chance.name}
+        row, solver = Table(case, [result]).row(1), ExponentSolver(case.problem)
+        assert row.keys() >= {index.name, f"{index.name}_error", chance.name}
         assert row[index.name] == pytest.approx(index.solve(solver).value, rel=1e-6)
 
 

@@ -1,13 +1,14 @@
 """What a run does where something fails or is interrupted between its steps."""
 
 import errno
+import json
 import pickle
 from concurrent.futures import Executor, Future
 from contextlib import nullcontext
 
 import pytest
 
-from fpsolve import FpsolveError
+from fpsolve import FpsolveError, open_results
 from fpsolve.case.sections import MonteCarloSection
 from fpsolve.commands import run_case
 from fpsolve.exponent.method import Budget
@@ -16,7 +17,7 @@ from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.known import ROW, names_of
 from fpsolve.solve.question import Numerics
 from fpsolve.solve.simulate import simulation_key
-from tests.kit import COSTLY, LEAN, TEXT, case_in, read_json, run
+from tests.kit import COSTLY, LEAN, TEXT, case_in, read_csv, read_json, run
 
 ASKED = {
     "moment": {"p": [1.0, 2.0]},
@@ -71,16 +72,16 @@ def raising(failure):
 @pytest.mark.parametrize(
     ("place", "command", "message"),
     [
-        ("fpsolve.commands.cases.Sweep", "run", "interrupted before the first curve; run it again to go on"),
+        ("fpsolve.commands.cases.Sweep", "run", "interrupted"),
         ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
         ("fpsolve.solve.sets.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
         (
-            "fpsolve.commands.sweep.write_curves",
+            "fpsolve.commands.cases.write_curves",
             "run",
             "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
         ),
         (
-            "fpsolve.tell.terminal.print_blocks",
+            "fpsolve.commands.options.print_blocks",
             "run",
             "interrupted; what was solved is kept in results/case; run it again to go on",
         ),
@@ -173,24 +174,18 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
     assert all(curve[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
 
 
-def test_many_curves_leave_their_numbers_to_results_nc(tmp_path, monkeypatch):
-    """summary.json has state and messages of each; the next command still knows whose files these are."""
+def test_many_curves_have_no_summary(tmp_path, monkeypatch):
+    """All is in curves.csv and results.nc."""
     asked = ["run", "case.toml", "--quiet", "--jobs", "1", "--set", "output={ figure=false, quantities=['moment'] }"]
     place = tmp_path / "results/case/summary.json"
     assert run(tmp_path, *asked, case=TEXT).code == 0
-    few = read_json(place)
-    monkeypatch.setattr("fpsolve.results.tables.MOST_SUMMARISED", 1)
-    assert run(tmp_path, *asked).code == 0
-    many = read_json(place)
-    assert many["curves"] == [
-        {key: each[key] for key in ("varied", "status", "warnings", "notes")} for each in few["curves"]
-    ]
-    for short, each in zip(many["curves"], few["curves"], strict=True):
-        assert many["parameters"] | short["varied"] == each["parameters"]
-    simulated = ["simulate", "case.toml", "--quiet", "--paths", "32", "--time", "20"]
-    for sets, is_kept in ([], True), (["--set", "noise.tau0=0.6"], False):
-        run(tmp_path, *simulated, *sets)
-        assert place.exists() == is_kept
+    few = read_json(place)["curves"]
+    monkeypatch.setattr("fpsolve.results.csv_json.MOST_SUMMARISED", 1)
+    assert json.loads(run(tmp_path, *asked, "--json").out)["curves"] == few
+    assert not place.exists()
+    told = ["; ".join([*each["warnings"], *each["notes"]]) for each in few]
+    assert told == [row["messages"] for row in read_csv(place.with_name("curves.csv"))]
+    assert told == open_results(place.parent).messages.values[::3].tolist()
 
 
 @pytest.mark.parametrize("failure", [OSError(errno.ENOSPC, "No space left on device"), OSError("encoder error")])

@@ -506,7 +506,7 @@ BENT = Problem(PlaneSystem([CoefficientMatrix(0, TURN), CoefficientMatrix(1, STI
         (spring(Mystery(1.0, 1.0)), 1.0, None, TypeError, "got Mystery; proofs are for OrnsteinUhlenbeck, NonGauss"),
         (spring(bounded(1.0, 1.0, 1.2)), -0.5, None, FpsolveError, "algebraic tails"),
         (spring(MANY), 1.0, None, TypeError, "got a chain of 401 states; proofs are for 400 at most"),
-        *((paper(bounded()), p, None, ValueError, "must be finite") for p in (math.nan, math.inf)),
+        *((paper(bounded()), p, None, ValueError, "must be a finite number") for p in (math.nan, math.inf)),
         *((paper(bounded()), 1.0, width, ValueError, "must be a positive number") for width in (0.0, -1e-9, math.nan)),
     ],
 )

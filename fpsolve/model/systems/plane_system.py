@@ -9,7 +9,7 @@ from typing import ClassVar, Self, cast
 
 import numpy as np
 
-from fpsolve.arrays import real_number, shown
+from fpsolve.arrays import real_number, require, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.plane import (
     MOST_VARIABLES,
@@ -48,8 +48,7 @@ class PlaneSystem(LinearMotion):
         for each in fields(LinearMotion):
             if each.name not in self.parts and vars(self)[each.name] != each.default:
                 raise TypeError(f"got {each.name}; {type(self).__name__} has {', '.join(self.parts)}; leave it out")
-        if not isinstance(self.cubic, CubicTerms | None):
-            raise TypeError(f"got cubic = {shown(self.cubic)}; must be CubicTerms, or None")
+        require(self.cubic, CubicTerms | None, "cubic", "CubicTerms, or None")
         for name, given, kind in (("terms", self.terms, CoefficientMatrix), ("jumps", self.jumps, Jump)):
             stated = tuple(given) if isinstance(given, Iterable) else (None,)
             if not all(isinstance(each, kind) for each in stated):

@@ -6,22 +6,19 @@ import io
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from glob import glob
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fpsolve.case.case import Case
+from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.exponent.quantities import MOMENT
 from fpsolve.files import atomic
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.known import Results
-from fpsolve.results.table import Table
 from fpsolve.solve.curve import Status
 
 if TYPE_CHECKING:
@@ -35,12 +32,11 @@ ROW = "row"
 """The dimension of many runs."""
 
 
-Variable = tuple[tuple[str, ...], NDArray[Any], Mapping[str, Any]]
-"""What stands in a file under a name: dimensions, numbers or texts, and attributes such as a unit."""
+MESSAGES = Quantity("messages", "messages", "what is said of the parameter set")
 
 
-def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, Any]) -> None:
-    """Write the numbers of all sets, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
+def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> None:
+    """Write the table of all sets, for xarray and whatever reads netCDF-4; what is missing or failed is NaN.
 
     There is a dimension for each varied key, or `set` for those of a list, and p.
 
@@ -51,51 +47,43 @@ def write_dataset(case: Case, results: Results, path: Path, facts: Mapping[str, 
         path: the file.
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
-    import h5netcdf
-
-    variables = _arrays(case, results.table)
-    content = io.BytesIO()  # HDF5 does not survive a full disk
-    with h5netcdf.File(content, "w") as file:
-        sizes = (zip(dims, values.shape, strict=True) for dims, values, _ in variables.values())
-        file.dimensions = dict(chain.from_iterable(sizes))
-        for name, (dims, values, attributes) in variables.items():
-            kind = values.dtype
-            fill = math.nan if kind.kind == "f" else None
-            file.create_variable(name, dims, kind, data=values, fillvalue=fill).attrs.update(attributes)
-        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
-        about |= {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
-        file.attrs.update({**about, "complete": int(len(results) == case.planned)})
-    with atomic(path) as draft:
-        draft.write_bytes(content.getvalue())
-
-
-def _arrays(case: Case, table: Table) -> dict[str, Variable]:
-    """The numbers of all sets, then the varied values and p."""
+    import h5netcdf  # 50 ms, with h5py
     import h5py
 
+    case, table, text = results.case, results.table, h5py.string_dtype()
     vary = case.vary
     is_list = bool(vary) and vary.mode != "product"
-    over, shape = (
-        ((SET,), (case.planned,)) if is_list else (vary.keys, tuple(len(vary.values(key)) for key in vary.keys))
-    )
-    found = dict[str, Variable]()
-    for name, column in table.items():
-        numbers: NDArray[Any] = column.values
-        attributes: dict[str, Any] = dict(column.quantity.timed(case.units.time).attributes)
-        if column.quantity is STATUS:
-            numbers = np.where(np.isnan(numbers), Status.MISSING, numbers).astype(np.int8)
-            attributes["flag_values"] = np.array([*Status], dtype=np.int8)
-            attributes["flag_meanings"] = " ".join(each.name.lower() for each in Status)
-        if is_list:
-            attributes["coordinates"] = " ".join(vary.keys)
-        found[name] = (*over, *column.quantity.dims), numbers.reshape(shape + numbers.shape[1:]), attributes
-    for key in vary.keys:
-        values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
-        array = np.array(values, dtype=h5py.string_dtype() if is_text else float)
-        found[key] = (SET if is_list else key,), array, {} if is_text else case.about(key).attributes
-    if MOMENT.name in case.asked:
-        found["p"] = ("p",), case.p, P.attributes
-    return found
+    sizes = {SET: case.planned} if is_list else {key: len(vary.values(key)) for key in vary.keys}
+    shape, beside = tuple(sizes.values()), {"coordinates": " ".join(vary.keys)} if is_list else {}
+    content = io.BytesIO()  # HDF5 does not survive a full disk
+    with h5netcdf.File(content, "w") as file:
+        file.dimensions = sizes | ({"p": table.p.size} if table.p.size else {})
+
+        def write(name: str, dims: Iterable[str], values: NDArray[Any], about: Mapping[str, object]) -> None:
+            fill = math.nan if values.dtype.kind == "f" else None
+            file.create_variable(name, tuple(dims), values.dtype, data=values, fillvalue=fill).attrs.update(about)
+
+        for name, column in table.items():
+            numbers: NDArray[Any] = column.values.reshape((*shape, *column.values.shape[1:]))
+            about: dict[str, object] = {**column.quantity.timed(case.units.time).attributes, **beside}
+            if column.quantity is STATUS:
+                numbers = np.where(np.isnan(numbers), Status.MISSING, numbers).astype(np.int8)
+                about["flag_values"] = np.array([*Status], dtype=np.int8)
+                about["flag_meanings"] = " ".join(each.name.lower() for each in Status)
+            write(name, (*sizes, *column.quantity.dims), numbers, about)
+        messages = np.array(table.messages, dtype=text).reshape(shape)
+        write(MESSAGES.name, sizes, messages, {**MESSAGES.attributes, **beside})
+        for key in vary.keys:
+            values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
+            array = np.array(values, dtype=text if is_text else float)
+            write(key, [SET if is_list else key], array, {} if is_text else case.about(key).attributes)
+        if table.p.size:
+            write("p", ["p"], table.p, P.attributes)
+        known = {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
+        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
+        file.attrs.update({**about, **known, "complete": int(len(results.whole) == case.planned)})
+    with atomic(path) as draft:
+        draft.write_bytes(content.getvalue())
 
 
 def open_results(*places: str | Path) -> xr.Dataset:
@@ -114,7 +102,7 @@ def open_results(*places: str | Path) -> xr.Dataset:
     Raises:
         FpsolveError: there is none.
     """
-    import xarray as xr
+    import xarray as xr  # 430 ms, with pandas
 
     there = [
         path
@@ -125,7 +113,8 @@ def open_results(*places: str | Path) -> xr.Dataset:
     runs, count = list[xr.Dataset](), 0
     for path in files:
         if path.suffix == ".nc" and path.exists():
-            runs.append(_rows(path, count))
+            with xr.open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as file:
+                runs.append(_rows(file.load(), path.parent.name, count))
             count = int(runs[-1][SET].max())
     if not runs:
         raise FpsolveError(f"no results.nc in {', '.join(map(str, places)) or 'nothing'}; run a case first")
@@ -136,17 +125,12 @@ def open_results(*places: str | Path) -> xr.Dataset:
     return joined.set_index(index)
 
 
-def _rows(path: Path, before: int) -> xr.Dataset:
-    """A file of a run over `row`, its sets counted on from those before; parameters are variables like others."""
-    import xarray as xr
-
-    options: dict[str, Any] = {"decode_times": False, "decode_timedelta": False}
-    with xr.open_dataset(path, engine="h5netcdf", **options) as file:
-        found = file.load()
+def _rows(found: xr.Dataset, name: str, before: int) -> xr.Dataset:
+    """A run over `row`, its sets counted on from those before; parameters are variables like others."""
     if "p" not in found.dims:
         found = found.assign_coords(p=[math.nan])
     rows = found.stack({ROW: [*found[STATUS.name].dims, "p"]}).reset_index(ROW).reset_coords()
     held = {key for key in found.attrs if str(key).partition(".")[0] in ("oscillator", "system", "noise")}
     rows.attrs = {key: value for key, value in found.attrs.items() if key not in held}
     numbers = before + 1 + np.arange(rows.sizes[ROW]) // found.sizes["p"]
-    return rows.assign({SET: (ROW, numbers), "run": path.parent.name, **{key: found.attrs[key] for key in held}})
+    return rows.assign({SET: (ROW, numbers), "run": name, **{key: found.attrs[key] for key in held}})
