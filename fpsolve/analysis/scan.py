@@ -10,7 +10,6 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from contourpy import contour_generator
-from scipy.interpolate import BPoly
 
 from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.errors import FpsolveError
@@ -91,6 +90,8 @@ class Scan(ReadOnly):
 
         The mixed derivatives at the nodes are differences of the gradients; 0 beside missing ones.
         """
+
+        from scipy.interpolate import BPoly  # 70 ms, of which only charts have need
 
         def along(values: FloatArray, slopes: FloatArray) -> FloatArray:
             return np.asarray(BPoly.from_derivatives(self.nodes, np.stack([values, slopes], axis=1))(points))
