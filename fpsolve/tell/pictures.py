@@ -160,4 +160,4 @@ FIGURES: Mapping[str, Figures] = {
     PHASE_AND_NOISE.part: _of_eigenfunctions,
     DIRECTIONS.part: _of_directions,
 }
-"""Of a curve in a folder, beside its simulation if there is one, by the names of questions."""
+"""Of a curve in a folder, beside its simulation if there is one; by the name of a question, or another name."""
