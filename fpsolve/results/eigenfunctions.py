@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 
@@ -40,7 +39,6 @@ def write_pictures(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
     if curve.number == 1 and found.has_density:
         write_density(folder / "density.vtu", found.stationary, *about)
     if found.pairs:
-        write_text(folder / "show.py", files("fpsolve.results").joinpath("show.py").read_text(encoding="utf-8"))
         write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", *about)
 
 

@@ -29,6 +29,7 @@ from fpsolve.model import MarkovChain, Telegraph, White
 from fpsolve.results import write_density, write_eigenfunctions
 from fpsolve.theory import first_order_eigenfunction
 from tests.conftest import sampled
+from tests.contract.test_cases import ROOT
 from tests.kit import TEXT, case_in, files, rates, read_json, run
 
 pytestmark = pytest.mark.slow
@@ -464,13 +465,14 @@ def test_paraview_reads_a_series_a_density_and_a_mesh(paraview, tmp_path):
 
 
 @pytest.mark.slow
-def test_show_script_draws_a_field_and_refuses_what_is_not_there(paraview, tmp_path):
+def test_script_of_the_docs_draws_a_field_and_refuses_what_is_not_there(paraview, tmp_path):
     """White around, and of many colours inside; what is read stays as it is."""
     sets = ["vary={}", DRAWN.replace("[1.5]", "[-1.0, 2.0]"), "oscillator.restitution=0.3", "moments.p=[-1.0, 2.0]"]
     fpsolve.run(case_in(tmp_path, TEXT, sets), tmp_path)
     folder = tmp_path / "test"
     before = {file: file.read_bytes() for file in folder.rglob("*.[pv][vt][du]")}
-    done = paraview(folder, "show.py", "--field", "T_adjoint", "--p", "2")
+    script = ROOT / "docs/paraview_picture.py"
+    done = paraview(folder, script, "--collection", "eigenfunctions.pvd", "--field", "T_adjoint", "--p", "2")
     assert done.returncode == 0, done.stderr
     picture = matplotlib.image.imread(folder / "eigenfunctions-T_adjoint.png")[:, :, :3]
     assert picture.shape == (1000, 1600, 3)
@@ -479,7 +481,7 @@ def test_show_script_draws_a_field_and_refuses_what_is_not_there(paraview, tmp_p
     red = (picture[..., 0] > 0.6) & (picture[..., 1] < 0.5) & (picture[..., 2] < 0.5)
     assert 1e-3 < np.mean(red) < 0.02  # the impacts
     assert {file: file.read_bytes() for file in before} == before
-    for asked, told in ((["--p", "1.9"], "choose one of -1, 2"), (["--collection", "none.pvd"], "none.pvd")):
-        done = paraview(folder, "show.py", *asked)
+    for name, p, told in (("eigenfunctions.pvd", 1.9, "choose one of -1, 2"), ("none.pvd", 2.0, "none.pvd")):
+        done = paraview(folder, script, "--collection", name, "--p", p)
         assert done.returncode == 2
         assert told in done.stderr
