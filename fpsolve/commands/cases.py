@@ -19,7 +19,7 @@ from fpsolve.case.sections import RESPONSE
 from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
-from fpsolve.files import atomic, writable
+from fpsolve.files import writable, write_bytes
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
@@ -27,8 +27,7 @@ from fpsolve.results.csv_json import GROWING, TABLES, Content, Writer, facts_of
 from fpsolve.results.eigenfunctions import FILES, write_curves
 from fpsolve.results.folders import own_folder
 from fpsolve.results.known import Results, record_of
-from fpsolve.results.response import write_response
-from fpsolve.results.simulate import SIMULATION
+from fpsolve.results.simulate import SIMULATION, write_response
 from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import CurveResult, Status
 from fpsolve.solve.question import Job, refuse_mesh
@@ -169,8 +168,7 @@ class Sweep:
         """Keep what became of a set, and its pictures; whether it has failed."""
         is_failed = bool(done.record) and self.results.put(job.curve, done.record).status.fails
         for name, content in done.files.items():
-            with atomic(self.folder / name) as draft:
-                draft.write_bytes(content)
+            write_bytes(self.folder / name, content)
         return is_failed
 
     def _write_if_due(self) -> None:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.files import atomic
+from fpsolve.files import write_bytes
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.known import Results
 from fpsolve.solve.curve import Status
@@ -60,8 +60,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
         file.dimensions = sizes | ({"p": table.p.size} if table.p.size else {})
 
         def write(name: str, dims: Iterable[str], values: NDArray[Any], about: Mapping[str, object]) -> None:
-            fill = math.nan if values.dtype.kind == "f" else None
-            file.create_variable(name, tuple(dims), values.dtype, data=values, fillvalue=fill).attrs.update(about)
+            file.create_variable(name, tuple(dims), values.dtype, data=values).attrs.update(about)
 
         for name, column in table.items():
             numbers: NDArray[Any] = column.values.reshape((*shape, *column.values.shape[1:]))
@@ -82,8 +81,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
         known = {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
         about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
         file.attrs.update({**about, **known, "complete": int(len(results.whole) == case.planned)})
-    with atomic(path) as draft:
-        draft.write_bytes(content.getvalue())
+    write_bytes(path, content.getvalue())
 
 
 def open_results(*places: str | Path) -> xr.Dataset:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, TypeVar
@@ -15,7 +15,6 @@ from fpsolve.case.case import Curve
 from fpsolve.data import written
 from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
-from fpsolve.model.problem import Problem
 from fpsolve.signals import signals_held
 
 LINE = 90
@@ -25,32 +24,26 @@ Facts = Mapping[str, Any]
 """Field data by their names."""
 
 
-def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
-    """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
-    known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
-    words = {
-        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in varied),
-        "held": "\n".join(parameter_lines(known, varied)),
-    }
-    stated = {f"{key} = {each}" if isinstance(each, str) else key: each for key, each in parameters.items()}
-    numbers = {name: 1.0 if isinstance(each, str) else each for name, each in stated.items()}
-    return numbers | {name: text.replace("²", "^2") for name, text in words.items() if text}
-
-
 def facts_of_curve(curve: Curve) -> Facts:
-    """The field data of a curve: its number, and its parameters."""
-    return field_data({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)
+    """The field data of a curve: its number, its parameters, and in words those that are varied and those held.
 
-
-def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
-    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
-    sections = dict[str, list[str]]()
-    for key, parameter in parameters.items():
-        if key not in besides:
+    A parameter that is a word is in the name. The words are in ASCII, as a picture shows them: `held` in lines for the
+    system and for the noise, none of them long.
+    """
+    known, sections = curve.problem.parameters, dict[str, list[str]]()
+    for key, parameter in known.items():
+        if key not in curve.varied:
             section, _, name = key.rpartition(".")
             sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
-    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
-    return [line.replace("\xa0", " ") for each in lines for line in each]
+    lines = [line for section, words in sections.items() for line in wrap(f"{section}: {', '.join(words)}", LINE)]
+    words = {
+        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in curve.varied),
+        "held": "\n".join(lines).replace("\xa0", " "),
+    }
+    facts: dict[str, Any] = {"curve": float(curve.number)}
+    for key, value in curve.parameters.items():
+        facts |= {f"{key} = {value}": 1.0} if isinstance(value, str) else {key: value}
+    return facts | {name: text.replace("²", "^2") for name, text in words.items() if text}
 
 
 def _valued(parameter: Parameter) -> str:
