@@ -115,9 +115,9 @@ def alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def write_json(path: Path, data: object, indent: int | None = 1) -> None:
+def write_json(path: Path, data: object) -> None:
     """Data without NaN or infinities as JSON."""
-    write_text(path, json.dumps(data, indent=indent, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[object]]) -> None:

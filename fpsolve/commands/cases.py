@@ -16,7 +16,7 @@ import numpy as np
 from fpsolve.arrays import require
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.sections import RESPONSE
-from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
+from fpsolve.commands.options import kept, of_curves, saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable, write_bytes

@@ -7,8 +7,15 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.commands.errors import NOT_CONVERGED
-from fpsolve.commands.interrupts import kept, saying_if_interrupted
-from fpsolve.commands.options import FLAGS, Cases, Done, Flags, on_cases
+from fpsolve.commands.options import (
+    FLAGS,
+    Cases,
+    Done,
+    Flags,
+    kept,
+    on_cases,
+    saying_if_interrupted,
+)
 from fpsolve.files import writable
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.chart import FILES, write_chart

@@ -25,8 +25,6 @@ ERROR = Quantity(
     dims=("p",),
     comment="total variation, from coarser ones",
 )
-_DIGITS = str.maketrans("₁₂₃₄²", "12342")
-"""Digits in ASCII."""
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 
@@ -75,7 +73,7 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     stationary = next((each for each in found if not each.pair.p), None)
     tilted = [each for each in found if each.pair.p]
     _write_numbers(grid, stationary, tilted or found, curve, folder)
-    along = {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    along = {f"along_{side}": f"{axis.words} ({axis.unit})" for side, axis in zip("xy", grid.quantities, strict=True)}
     facts = {**facts_of_curve(curve), **along}
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
@@ -90,8 +88,3 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
 
     if tilted:
         write_series(folder, f"eigenfunctions{curve.suffix}", {each.pair.p: each for each in tilted}, write)
-
-
-def _plain(axis: Quantity) -> str:
-    """The words of a coordinate and its unit, in ASCII."""
-    return f"{axis.words} ({axis.unit})".translate(_DIGITS).encode("ascii", "replace").decode()

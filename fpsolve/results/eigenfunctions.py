@@ -128,12 +128,10 @@ def write_curves(case: Case, folder: Path) -> None:
         return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
     is_number = len(keys) == 1 and not case.vary.is_text(keys[0])
-    entries = [
-        (float(each.varied[keys[0]]), name, f"{each.label}, p = {p:g}")
-        if is_number
-        else (float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}")
+    entries = (
+        (float(each.varied[keys[0]] if is_number else each.number), name, f"{each.label}, p = {p:g}")
         for each, name in there
-    ]
+    )
     write_text(folder / CURVES, collection_of(sorted(entries)))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from textwrap import wrap
 from typing import Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
@@ -17,8 +16,6 @@ from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
 from fpsolve.signals import signals_held
 
-LINE = 90
-"""Largest number of letters of a line of parameters."""
 Shown = TypeVar("Shown")
 Facts = Mapping[str, Any]
 """Field data by their names."""
@@ -27,18 +24,16 @@ Facts = Mapping[str, Any]
 def facts_of_curve(curve: Curve) -> Facts:
     """The field data of a curve: its number, its parameters, and in words those that are varied and those held.
 
-    A parameter that is a word is in the name. The words are in ASCII, as a picture shows them: `held` in lines for the
-    system and for the noise, none of them long.
+    A parameter that is a word is in the name. The words are in ASCII, `held` with a line for each section.
     """
     known, sections = curve.problem.parameters, dict[str, list[str]]()
     for key, parameter in known.items():
         if key not in curve.varied:
             section, _, name = key.rpartition(".")
-            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
-    lines = [line for section, words in sections.items() for line in wrap(f"{section}: {', '.join(words)}", LINE)]
+            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}")
     words = {
         "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in curve.varied),
-        "held": "\n".join(lines).replace("\xa0", " "),
+        "held": "\n".join(f"{section}: {', '.join(each)}" for section, each in sections.items()),
     }
     facts: dict[str, Any] = {"curve": float(curve.number)}
     for key, value in curve.parameters.items():
