@@ -38,20 +38,9 @@ from fpsolve.tell.terminal import print_blocks
 
 def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Content) -> None:
     """design.json, and where there is a design, design.toml: the case with its values."""
-    write_json(folder / "design.json", summary(case, outcome, facts))
-    found = outcome.found
-    if found is not None:
-        values = {key: each.value for key, each in found.values.items()}
-        expected = outcome.expectation(case)
-        more = f"\n{tomlkit.dumps({'expect': [expected]})}" if expected else ""
-        write_text(folder / "design.toml", rewritten(case, folder, values, without=["expect"], more=more))
-
-
-def summary(case: Case, outcome: DesignOutcome, facts: Content) -> Content:
-    """What became of a design."""
     found, target, before = outcome.found, outcome.target, case.problem.values
     changed: Mapping[str, Estimate] = found.values if found else {}
-    return {
+    content = {
         **head(case),
         "complete": found is not None,
         "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
@@ -73,6 +62,12 @@ def summary(case: Case, outcome: DesignOutcome, facts: Content) -> Content:
         "message": outcome.reason,
         **facts,
     }
+    write_json(folder / "design.json", content)
+    if found is not None:
+        values = {key: each.value for key, each in changed.items()}
+        expected = outcome.expectation(case)
+        more = f"\n{tomlkit.dumps({'expect': [expected]})}" if expected else ""
+        write_text(folder / "design.toml", rewritten(case, folder, values, without=["expect"], more=more))
 
 
 def design(

@@ -108,8 +108,8 @@ def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_wh
         CurveClaims(
             parameters=dict(proof.curve.parameters),
             moments=[moment_of(p, found) for p, found in proof.moments],
-            lyapunov_exponent=None if proof.exponent is None else bound_of(proof.exponent),
-            stability_index=None if proof.index is None else _index(proof.index),
+            lyapunov_exponent=bound_of(proof.exponent) if proof.exponent else None,
+            stability_index=_index(proof.index) if proof.index else None,
             verdicts=proof.verdicts,
         )
         for proof in proofs

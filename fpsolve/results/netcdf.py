@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
 from fpsolve.files import write_bytes
 from fpsolve.model.quantity import STATUS, P
@@ -30,9 +29,6 @@ SET = "set"
 RESULTS = "results.nc"
 ROW = "row"
 """The dimension of many runs."""
-
-
-MESSAGES = Quantity("messages", "messages", "what is said of the parameter set")
 
 
 def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> None:
@@ -71,7 +67,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
                 about["flag_meanings"] = " ".join(each.name.lower() for each in Status)
             write(name, (*sizes, *column.quantity.dims), numbers, about)
         messages = np.array(table.messages, dtype=text).reshape(shape)
-        write(MESSAGES.name, sizes, messages, {**MESSAGES.attributes, **beside})
+        write("messages", sizes, messages, {"long_name": "what is said of the parameter set", **beside})
         for key in vary.keys:
             values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
             array = np.array(values, dtype=text if is_text else float)
