@@ -56,13 +56,8 @@ def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, A
         data: point data of this shape; the first is shown first.
         facts: field data.
     """
-    pyvista, numbers = pyvista_module(), np.arange(places[0].size).reshape(places[0].shape)
-    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
-    corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
-    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
-    points = np.stack([each.ravel() for each in places], axis=1)
-    write_points(path, pyvista.UnstructuredGrid({kind: np.stack(corners, axis=1)}, points), data, facts)
+    grid = pyvista_module().StructuredGrid(*places).cast_to_unstructured_grid()
+    write_points(path, grid, {name: values.ravel(order="F") for name, values in data.items()}, facts)
 
 
 def nodes_of_quadrilateral(degree: int) -> Sequence[tuple[int, int]]:

@@ -311,8 +311,8 @@ def test_densities_over_directions_of_two_modes_are_the_same_in_netcdf_and_for_p
     assert 0 < found.density_error < 0.02
     grid, density = (pyvista.read(folder / name) for name in ("eigenfunctions/p+1.0.vtu", "density.vtu"))
     assert grid.bounds == pytest.approx((0, np.pi / 2, 0, 2 * np.pi, 0, 0))
-    np.testing.assert_array_equal(grid["tilted_density"], found.tilted_density.values.ravel())
-    np.testing.assert_array_equal(density["stationary_density"], found.stationary_density.values.ravel())
+    np.testing.assert_array_equal(grid["tilted_density"], found.tilted_density.values[0].ravel("F"))
+    np.testing.assert_array_equal(density["stationary_density"], found.stationary_density.values.ravel("F"))
     np.testing.assert_allclose(grid["share"], np.sin(grid.points[:, 0]) ** 2, atol=1e-12)
     assert grid.active_scalars_name == "tilted_density"
     assert bytes(grid.field_data["along_x"]).decode() == "angle whose squared sine is the share of q2 (rad)"
@@ -344,7 +344,7 @@ def test_density_over_directions_of_three_variables_is_on_a_sphere(tmp_path):
     fpsolve.run(case_in(tmp_path, THREE, [DRAWN.replace("1.5", "1.0")]), tmp_path)
     grid = pyvista.read(tmp_path / "test/eigenfunctions/p+1.0.vtu")
     np.testing.assert_allclose(np.linalg.norm(grid.points, axis=1), 1, atol=1e-12)
-    values = grid["tilted_density"].reshape(-1, len(np.unique(grid["latitude"])))
+    values = grid["tilted_density"].reshape(len(np.unique(grid["latitude"])), -1).T
     half = len(values) // 2
     np.testing.assert_allclose(values[half:, ::-1], values[: half + 1], atol=1e-8 * values.max())  # −e is e
     sizes, middle = grid.compute_cell_sizes()["Area"], grid.point_data_to_cell_data()["tilted_density"]
