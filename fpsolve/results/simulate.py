@@ -34,7 +34,7 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         "response": response
         and {
             "means": {name: sampled(*each) for name, each in response.means.items()},
-            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
+            "impact_rate": response.impact_rate,
             "outside": response.outside,
             "time": response.time,
         },
