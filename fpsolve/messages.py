@@ -427,8 +427,11 @@ class Message(str):
         """A message of a code; numpy's numbers and arrays become Python's numbers and tuples."""
         known = {key: _python(value) for key, value in data.items()}
         made = super().__new__(cls, _words(code, known))
-        made.code, made.data = code, MappingProxyType(known)
+        made.__dict__.update(code=code, data=MappingProxyType(known))
         return made
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a message is not changed: {name}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Message, self.code, **self.data), ()
