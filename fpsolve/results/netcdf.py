@@ -66,7 +66,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
                 about["flag_meanings"] = " ".join(each.name.lower() for each in Status)
             write(name, (*sizes, *column.quantity.dims), numbers, about)
         messages = np.array(table.messages, dtype=text).reshape(shape)
-        write("messages", sizes, messages, {"long_name": "what is said of the parameter set", **beside})
+        write("messages", sizes, messages, {"long_name": "what is said of the parameter set", "units": "1", **beside})
         for key in vary.keys:
             values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
             array = np.array(values, dtype=text if is_text else float)

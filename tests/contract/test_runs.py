@@ -372,7 +372,7 @@ def test_densities_of_a_response_in_all_files_are_one(response):
     plane, whole = (pyvista.read(folder / f"response{name}.vtu") for name in ("", "_3d"))
     polar = plane["density"].reshape(49, 40).T * a[:, None]  # per amplitude and phase
     assert simpson(polar, dx=math.pi / 48, axis=1) == pytest.approx(density, rel=1e-3)
-    table, xi = whole["density"].reshape(12, 49, 40).T, np.unique(whole.points[:, 2])
+    table, xi = whole["density"].reshape(12, 49, 40).T, whole.points[::1960, 2]
     assert table.sum(axis=2) * (xi[1] - xi[0]) == pytest.approx(polar, abs=4e-3 * polar.max())
     x, v = plane.points[:, 0], plane.points[:, 1]
     assert (x >= 0).all()
