@@ -115,9 +115,9 @@ def alone(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def write_json(path: Path, data: object, indent: int | None = 1) -> None:
+def write_json(path: Path, data: object) -> None:
     """Data without NaN or infinities as JSON."""
-    write_text(path, json.dumps(data, indent=indent, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
@@ -128,8 +128,12 @@ def write_csv(path: Path, columns: Sequence[str], rows: Iterable[Iterable[object
 
 
 def write_text(path: Path, text: str) -> None:
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
     with atomic(path) as draft:
-        draft.write_text(text, encoding="utf-8")
+        draft.write_bytes(content)
 
 
 @dataclass

@@ -245,10 +245,10 @@ def _client(address: str) -> Any:
     if versions == {__version__} and threads == {1}:
         return client
     client.close()
-    state = f"have fpsolve {', '.join(versions)}, not {__version__}" if versions else "are not there"
-    state = "have several threads" if versions == {__version__} else state
-    remedy = f"dask worker {address} --nworkers -1 --nthreads 1"
-    raise FpsolveError(f"workers of {address} {state}; start them with: {remedy}")
+    found = f"fpsolve {', '.join(versions)} and up to {max(threads)} threads" if versions else "no workers"
+    must = f"must be workers with fpsolve {__version__} and one thread each"
+    remedy = f"start them with: dask worker {address} --nworkers -1 --nthreads 1"
+    raise FpsolveError(f"scheduler: {address} has {found}; {must}; {remedy}")
 
 
 def _version() -> str:

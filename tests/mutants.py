@@ -263,10 +263,10 @@ DEFECTS: tuple[Defect, ...] = (
     ),
     Defect("L11 a file of any size is read", "files.py", "if about.st_size > most:", "if about.st_size < 0:", "large"),
     Defect(
-        "R1 cells of the plane are cubes in a VTK file",
+        "R1 point data are in another order than the points of a VTK file",
         "results/vtk.py",
-        "steps = square if numbers.ndim == 2 else",
-        "steps = square if numbers.ndim != 2 else",
+        'values.ravel(order="F") for name',
+        "values.ravel() for name",
         "vtk",
     ),
     Defect(

@@ -2,7 +2,6 @@ from .cases import Outcome as Outcome
 from .cases import run_case as run_case
 from .chart import chart_case as chart_case
 from .check import check_case as check_case
-from .noise import noise_case as noise_case
 from .options import Flags as Flags
 from .options import Options as Options
 from .options import Workers as Workers

@@ -15,11 +15,10 @@ import numpy as np
 
 from fpsolve.arrays import require
 from fpsolve.case.case import Case, load_case
-from fpsolve.case.sections import RESPONSE
-from fpsolve.commands.interrupts import kept, of_curves, saying_if_interrupted
+from fpsolve.commands.options import kept, of_curves, saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
-from fpsolve.files import atomic, writable
+from fpsolve.files import writable, write_bytes
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
@@ -27,8 +26,7 @@ from fpsolve.results.csv_json import GROWING, TABLES, Content, Writer, facts_of
 from fpsolve.results.eigenfunctions import FILES, write_curves
 from fpsolve.results.folders import own_folder
 from fpsolve.results.known import Results, record_of
-from fpsolve.results.response import write_response
-from fpsolve.results.simulate import SIMULATION
+from fpsolve.results.simulate import SIMULATION, write_response
 from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import CurveResult, Status
 from fpsolve.solve.question import Job, refuse_mesh
@@ -169,8 +167,7 @@ class Sweep:
         """Keep what became of a set, and its pictures; whether it has failed."""
         is_failed = bool(done.record) and self.results.put(job.curve, done.record).status.fails
         for name, content in done.files.items():
-            with atomic(self.folder / name) as draft:
-                draft.write_bytes(content)
+            write_bytes(self.folder / name, content)
         return is_failed
 
     def _write_if_due(self) -> None:
@@ -188,7 +185,7 @@ class Sweep:
         """Write all tables, the series over the curves, and the files of what records hold."""
         self._write(TABLES)
         write_curves(self.case, self.folder)
-        for result in self.results if RESPONSE in self.results.asked[0] else ():
+        for result in self.results:
             if result.response:
                 write_response(result.response, result.curve, self.folder)
 
@@ -296,7 +293,7 @@ def run_case(
             sweep = Sweep(case, folder, is_fresh=is_fresh)
         sweep.run(pool, watch)
         results, simulated = sweep.results, simulations.simulated
-        said = [*notes(case, results.telling, count=len(results))]
+        said = [*notes(case, results, count=len(results))]
 
         def finish() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):

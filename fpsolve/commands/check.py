@@ -9,8 +9,19 @@ from cyclopts import Parameter
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED
-from fpsolve.commands.interrupts import ANEW, kept, of_curves, saying_if_interrupted
-from fpsolve.commands.options import OPTIONS, WORKERS, Cases, Done, Options, Workers, on_cases
+from fpsolve.commands.options import (
+    ANEW,
+    OPTIONS,
+    WORKERS,
+    Cases,
+    Done,
+    Options,
+    Workers,
+    kept,
+    of_curves,
+    on_cases,
+    saying_if_interrupted,
+)
 from fpsolve.messages import Severity
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.solve.check import (

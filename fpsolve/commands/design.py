@@ -2,27 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
+import tomlkit
 from cyclopts import Parameter
 
 from fpsolve.analysis.axis import Axis
 from fpsolve.case.case import Case
+from fpsolve.case.rewrite import rewritten
 from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED
-from fpsolve.commands.interrupts import ANEW, saying_if_interrupted
-from fpsolve.commands.options import OPTIONS, Cases, Done, Options, on_cases, print_in_one_line
-from fpsolve.files import writable
+from fpsolve.commands.options import (
+    ANEW,
+    OPTIONS,
+    Cases,
+    Done,
+    Options,
+    on_cases,
+    print_in_one_line,
+    saying_if_interrupted,
+)
+from fpsolve.exponent.error import Estimate
+from fpsolve.files import writable, write_json, write_text
 from fpsolve.pool import Pool
-from fpsolve.results.csv_json import facts_of
-from fpsolve.results.design import write_design
+from fpsolve.results.csv_json import Content, facts_of, head
 from fpsolve.results.folders import own_folder
-from fpsolve.solve.design import solve_design, wanted_of
+from fpsolve.solve.design import DesignOutcome, solve_design, wanted_of
 from fpsolve.tell.blocks import Note
 from fpsolve.tell.design import found_of, show
 from fpsolve.tell.progress import SOLVES, Phase
 from fpsolve.tell.terminal import print_blocks
+
+
+def write_design(case: Case, outcome: DesignOutcome, folder: Path, facts: Content) -> None:
+    """design.json, and where there is a design, design.toml: the case with its values."""
+    found, target, before = outcome.found, outcome.target, case.problem.values
+    changed: Mapping[str, Estimate] = found.values if found else {}
+    content = {
+        **head(case),
+        "complete": found is not None,
+        "target": {"quantity": target.kind, "p": target.p if target.kind == "moment" else None, "value": target.value},
+        "by": [
+            {
+                **{name: vars(axis)[name] for name in ("key", "start", "stop", "scale")},
+                "unit": outcome.units[axis.key],
+                "before": before[axis.key],
+                "after": after and after.value,
+                "error_estimate": after and after.error_estimate,
+            }
+            for axis in outcome.by
+            for after in [changed.get(axis.key)]
+        ],
+        "found": found and {"value": found.found.value, "error_estimate": found.found.error_estimate},
+        "distance": found and found.distance,
+        "solves": found and found.solves,
+        "parameters": dict(before),
+        "message": outcome.reason,
+        **facts,
+    }
+    write_json(folder / "design.json", content)
+    if found is not None:
+        values = {key: each.value for key, each in changed.items()}
+        expected = outcome.expectation(case)
+        more = f"\n{tomlkit.dumps({'expect': [expected]})}" if expected else ""
+        write_text(folder / "design.toml", rewritten(case, folder, values, without=["expect"], more=more))
 
 
 def design(

@@ -32,52 +32,15 @@ from fpsolve.solve.noise import (
     SECONDS,
     STEPS_OF_A_FIT,
     Modes,
-    NoiseOutcome,
     Wanted,
     measure,
     natural_frequencies,
     refuse_wrong_case,
 )
 from fpsolve.tell.noise import Convention, draw_noise, show
-from fpsolve.tell.progress import SILENT, SOLVES, Phase, Watch
+from fpsolve.tell.progress import SOLVES, Phase
 from fpsolve.tell.solved import last_line
 from fpsolve.tell.terminal import print_blocks
-
-
-def noise_case(
-    data: Spectrum | Record, wanted: Wanted, source: Path, shown: Convention, out: Path, watch: Watch = SILENT
-) -> tuple[NoiseOutcome, Path, list[str]]:
-    """Fit a noise, and write it with a figure into a folder called as the file of the measurement.
-
-    noise.json, noise.png and noise.pdf are written, and where there is a system noise.toml, a case.
-
-    Args:
-        data, wanted: see `measure`.
-        source: the file.
-        shown: how densities are shown.
-        out: where the folder is made.
-        watch: of the progress, with a bar for the fit and what it means.
-
-    Returns:
-        What became of it, the folder, and the names of the files.
-
-    Raises:
-        FpsolveError: there is no fit; nothing is written.
-        OutputError: the folder cannot be made or written to, or another run writes into it.
-    """
-    folder = out / source.name  # with its ending, so that it is none of a case
-    try:
-        with one_thread(), watch.bar(Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)) as progress:
-            outcome = measure(data, wanted, progress)  # the arrays are small
-    except FpsolveError as error:
-        raise FpsolveError(f"{source}: {error}") from None
-    with own_folder(folder, "noise"), writable(folder):
-        text = case_of(outcome, folder)
-        write_json(folder / "noise.json", summary(outcome, source))
-        if text:
-            write_text(folder / "noise.toml", text)
-        draw_noise(outcome, source, shown, folder)
-    return outcome, folder, [name for name in FILES if text or name != "noise.toml"]
 
 
 @Parameter(name="*")
@@ -268,15 +231,16 @@ def _modes(stated: Statement, case: Case | None) -> Modes:
     if len(told) > 1:
         text = " and ".join(f"{option} {words}" for option, words in told.items())
         raise FpsolveError(f"got {text}; leave out one of {' and '.join(told)}")
-    [omega] = filter(None, found.values())
+    [option] = told
+    omega = found[option]
     if len(omega) > 2:
-        raise FpsolveError(f"got {len(omega)} frequencies; must be one or two; choose those of the coupled modes")
+        raise FpsolveError(f"{option} has {len(omega)} modes; choose one or two by --mode, or as many --frequency")
     known = zeta if zeta is not None else table[0].damping_ratio if table else math.nan
     return Modes(tuple(omega), known, stated.restitution)
 
 
 def _rows(stated: Statement) -> Sequence[Mode]:
-    """The rows of the table of modes that are chosen, one or two; none without a table."""
+    """The rows of the table of modes that are chosen; none without a table."""
     if stated.modes is None:
         return ()
     rows = read_modes(stated.modes)
@@ -284,11 +248,7 @@ def _rows(stated: Statement) -> Sequence[Mode]:
         if not 1 <= number <= len(rows):
             must = f"must be from 1 to {len(rows)}, the number of its row"
             raise FpsolveError(f"{stated.modes}: got --mode {number}; {must}")
-    chosen = [rows[number - 1] for number in stated.mode] if stated.mode else rows
-    if len(chosen) > 2:
-        text = f"has {len(chosen)} modes; choose one or two by --mode, such as --mode 1 --mode 2"
-        raise FpsolveError(f"{stated.modes}: {text}")
-    return chosen
+    return [rows[number - 1] for number in stated.mode] if stated.mode else rows
 
 
 def noise(
@@ -318,11 +278,23 @@ def noise(
     case = OPTIONS.load([stated.case])[0] if stated.case else None
     data, wanted, source = measurement_of(spectrum, stated, case)
     shown = Convention(stated.per or "Hz", stated.sided or "one")
-    outcome, folder, names = noise_case(data, wanted, source, shown, out, OPTIONS.watch(is_json=json))
+    folder, phase = out / source.name, Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)
+    try:
+        with one_thread(), OPTIONS.watch(is_json=json).bar(phase) as progress:
+            outcome = measure(data, wanted, progress)  # the arrays are small
+    except FpsolveError as error:
+        raise FpsolveError(f"{source}: {error}") from None
+    with own_folder(folder, "noise"), writable(folder):
+        text = case_of(outcome, folder)
+        write_json(folder / "noise.json", summary(outcome, source))
+        if text:
+            write_text(folder / "noise.toml", text)
+        draw_noise(outcome, source, shown, folder)
     if json:
-        print_in_one_line(folder / names[0])
+        print_in_one_line(folder / "noise.json")
     else:
         print(escaped(noise_sections(outcome).strip()), end="\n\n")
         print_blocks(show(outcome, source, shown))
-        print_blocks([last_line(folder, ", ".join(names), monotonic() - start)])
+        names = ", ".join(name for name in FILES if text or name != "noise.toml")
+        print_blocks([last_line(folder, names, monotonic() - start)])
     return NOT_CONVERGED if outcome.failure is not None else 0

@@ -1,11 +1,12 @@
-"""Options that several commands take, and the loop of all commands on cases."""
+"""Options that several commands take, the loop of all commands on cases, and what is said where it is interrupted."""
 
 from __future__ import annotations
 
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from fpsolve.commands.errors import print_error
 from fpsolve.errors import CaseError, FpsolveError
 from fpsolve.messages import Severity
 from fpsolve.pool import Pool, cluster, limit_processors, parallel
-from fpsolve.signals import INTERRUPTED
+from fpsolve.signals import INTERRUPTED, is_interrupt
 from fpsolve.tell.progress import Bars, Watch
 from fpsolve.tell.solved import last_line
 from fpsolve.tell.terminal import print_blocks
@@ -198,3 +199,27 @@ def on_cases(
 def print_in_one_line(path: Path) -> None:
     """Print a file of JSON."""
     print(" ".join(line.strip() for line in path.read_text(encoding="utf-8").splitlines()))
+
+
+AGAIN, ANEW = "run it again to go on", "run it again to start over"
+
+
+@contextmanager
+def saying_if_interrupted(what_is_kept: Callable[[], str], again: str = AGAIN) -> Iterator[None]:
+    """An interrupt of the body, also one that a library has made another exception of, says what is kept."""
+    try:
+        yield
+    except BaseException as failure:
+        if isinstance(failure, FpsolveError) or not is_interrupt(failure):
+            raise
+        raise KeyboardInterrupt(f"interrupted{what_is_kept()}; {again}") from None
+
+
+def kept(done: int, of: str, folder: Path | None = None, *, is_more: bool = False) -> str:
+    """How much was done of what, and where that is, if it is kept, or a part of the next."""
+    return f" after {done} {of}" + (f"; what was done is kept in {folder}" if (done or is_more) and folder else "")
+
+
+def of_curves(case: Case) -> str:
+    """What is counted of a case: "of 3 curves"."""
+    return f"of {case.planned} curve{'s' if case.planned > 1 else ''}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
 from operator import call
@@ -10,16 +11,25 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from fpsolve import __version__
 from fpsolve.case.case import Case
 from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED, print_error
-from fpsolve.commands.interrupts import kept, saying_if_interrupted
-from fpsolve.commands.options import FLAGS, Done, Flags, Options, on_cases
+from fpsolve.commands.options import (
+    FLAGS,
+    Done,
+    Flags,
+    Options,
+    kept,
+    on_cases,
+    saying_if_interrupted,
+)
 from fpsolve.errors import FpsolveError
-from fpsolve.files import writable
+from fpsolve.files import writable, write_text
 from fpsolve.messages import escaped
 from fpsolve.pool import SERIAL, Pool
+from fpsolve.proofs.claims import Claims, CurveClaims, IndexBound, bound_of, moment_of
+from fpsolve.proofs.questions import IndexEnclosure
 from fpsolve.results.folders import own_folder
-from fpsolve.results.prove import PROOF, write_proof
 from fpsolve.solve.prove import (
     PROVEN_BOUNDS,
     PROVEN_RECORDS,
@@ -39,6 +49,9 @@ from fpsolve.tell.prove import show
 from fpsolve.tell.reports import shown_at_the_end, write_report
 from fpsolve.tell.solved import done_of
 from fpsolve.tell.terminal import print_blocks
+
+PROOF = "proof.json"
+"""The file of proven bounds."""
 
 
 def prove_case(
@@ -89,11 +102,30 @@ def prove_case(
     return proofs
 
 
-ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)]
+def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
+    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
+    curves = [
+        CurveClaims(
+            parameters=dict(proof.curve.parameters),
+            moments=[moment_of(p, found) for p, found in proof.moments],
+            lyapunov_exponent=bound_of(proof.exponent) if proof.exponent else None,
+            stability_index=_index(proof.index) if proof.index else None,
+            verdicts=proof.verdicts,
+        )
+        for proof in proofs
+    ]
+    claims = Claims(fpsolve=__version__, case=case.name, complete=is_whole, curves=curves)
+    write_text(folder / PROOF, claims.model_dump_json(indent=1) + "\n")
+
+
+def _index(found: IndexEnclosure) -> IndexBound:
+    """Bounds on δ_p, and Λ at two p beside it."""
+    lower, upper = (found.lower, found.upper) if found.is_proven else (None, None)
+    return IndexBound(lower=lower, upper=upper, moments=[moment_of(p, each) for p, each in found.moments])
 
 
 def prove(
-    cases: ProvenCases = None,
+    cases: Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)] = None,
     *,
     width: float | None = None,
     check: Path | None = None,

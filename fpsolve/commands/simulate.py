@@ -10,8 +10,19 @@ from itertools import chain
 from pathlib import Path
 
 from fpsolve.case.case import Case
-from fpsolve.commands.interrupts import AGAIN, kept, of_curves, saying_if_interrupted
-from fpsolve.commands.options import FLAGS, Cases, Count, Done, Flags, Fresh, on_cases
+from fpsolve.commands.options import (
+    AGAIN,
+    FLAGS,
+    Cases,
+    Count,
+    Done,
+    Flags,
+    Fresh,
+    kept,
+    of_curves,
+    on_cases,
+    saying_if_interrupted,
+)
 from fpsolve.files import writable
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.folders import own_folder

@@ -38,13 +38,10 @@ MOST_SUMMARISED = 1000
 
 def facts_of(case: Case, started: datetime) -> Content:
     """Of a run: versions, the command, the machine, when it began, how long it took by now, the case as written."""
-    name, *rest = sys.argv or [""]  # empty where Python is embedded
     packages = {each: version(each) for each in ("numpy", "scipy", "scikit-fem")}
     return {
         "versions": {"fpsolve": __version__, "python": platform.python_version(), **packages},
-        "command": shlex.join(
-            ["python", "-m", "fpsolve", *rest] if name.endswith("__main__.py") else [Path(name).name, *rest]
-        ),
+        "command": shlex.join(sys.argv),
         "host": socket.gethostname(),
         "started": started.isoformat(timespec="seconds"),
         "wall_seconds": round((datetime.now(UTC) - started).total_seconds(), 3),

@@ -12,8 +12,8 @@ import numpy as np
 
 from fpsolve.case.case import Curve
 from fpsolve.data import Quantity, dataset
-from fpsolve.exponent.density import Densities
-from fpsolve.files import atomic
+from fpsolve.exponent.density import Densities, DirectionGrid
+from fpsolve.files import write_bytes
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.results.nodes import FIELDS
 from fpsolve.results.vtk import facts_of_curve, write_between, write_series
@@ -25,8 +25,6 @@ ERROR = Quantity(
     dims=("p",),
     comment="total variation, from coarser ones",
 )
-_DIGITS = str.maketrans("₁₂₃₄²", "12342")
-"""Digits in ASCII."""
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 
@@ -35,22 +33,15 @@ def directions_file(curve: Curve, folder: Path) -> Path:
     return folder / f"densities{curve.suffix}.nc"
 
 
-def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
-    """Write densities.nc: of every p that is there the fields over directions, and that at p = 0 as the stationary one.
-
-    Args:
-        found: on one grid, one at least.
-        curve: whose they are.
-        folder: where.
-    """
-    shown = [each for each in found if each.pair.p or len(found) == 1]
-    grid = found[0].grid
+def _write_numbers(
+    grid: DirectionGrid, stationary: Densities | None, shown: Sequence[Densities], curve: Curve, folder: Path
+) -> None:
+    """Write densities.nc: the stationary density, if it is there, and the fields at the p that are shown."""
     plane = tuple(each.name for each in grid.quantities)
     numbers = dict[Quantity, Any]()
-    for each in found:
-        if not each.pair.p:
-            numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = each.fields.T_adjoint
-            numbers[replace(ERROR, name="stationary_density_error", dims=())] = each.error
+    if stationary:
+        numbers[replace(STATIONARY, dims=plane, unit=grid.unit)] = stationary.fields.T_adjoint
+        numbers[replace(ERROR, name="stationary_density_error", dims=())] = stationary.error
     fields = np.stack([each.fields for each in shown], axis=1)
     for (name, quantity), values in zip(FIELDS.items(), fields, strict=True):
         numbers[replace(quantity, dims=("p", *plane), unit="1" if name == "T" else grid.unit)] = values
@@ -65,8 +56,7 @@ def write_densities(found: Sequence[Densities], curve: Curve, folder: Path) -> N
     content = io.BytesIO()  # HDF5 does not survive a full disk
     whole = dataset("densities of directions", "finite elements", numbers, places, curve.parameters)
     whole.to_netcdf(content, engine="h5netcdf")
-    with atomic(directions_file(curve, folder)) as draft:
-        draft.write_bytes(content.getvalue())
+    write_bytes(directions_file(curve, folder), content.getvalue())
 
 
 def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
@@ -80,13 +70,14 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
         return
     grid = max((each.grid for each in found), key=lambda grid: grid.first.size)
     found = [each.on(grid) for each in found]
-    write_densities(found, curve, folder)
-    along = {f"along_{side}": _plain(axis) for side, axis in zip("xy", grid.quantities, strict=True)}
+    stationary = next((each for each in found if not each.pair.p), None)
+    tilted = [each for each in found if each.pair.p]
+    _write_numbers(grid, stationary, tilted or found, curve, folder)
+    along = {f"along_{side}": f"{axis.words} ({axis.unit})" for side, axis in zip("xy", grid.quantities, strict=True)}
     facts = {**facts_of_curve(curve), **along}
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
-    stationary = [each.fields.T_adjoint for each in found if not each.pair.p]
-    always = {"stationary_density": stationary[0]} if stationary else {}
+    always = {"stationary_density": stationary.fields.T_adjoint} if stationary else {}
     always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
     if stationary and curve.number == 1:
         write_between(folder / "density.vtu", places, always, {"p": 0.0, "Lambda": 0.0, **facts})
@@ -95,10 +86,5 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
         data = dict(reversed(each.fields._asdict().items()))
         write_between(path, places, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
 
-    if others := {each.pair.p: each for each in found if each.pair.p}:
-        write_series(folder, f"eigenfunctions{curve.suffix}", others, write)
-
-
-def _plain(axis: Quantity) -> str:
-    """The words of a coordinate and its unit, in ASCII."""
-    return f"{axis.words} ({axis.unit})".translate(_DIGITS).encode("ascii", "replace").decode()
+    if tilted:
+        write_series(folder, f"eigenfunctions{curve.suffix}", {each.pair.p: each for each in tilted}, write)

@@ -9,8 +9,7 @@ Field data are numbers, as meshio refuses texts: a text is the codes of its lett
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
-from importlib.resources import files
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
@@ -25,7 +24,15 @@ from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.files import write_text
 from fpsolve.results.directions import write_directions
 from fpsolve.results.nodes import Nodes
-from fpsolve.results.vtk import Facts, collection_of, field_data, name_at, pyvista_module, write_points, write_series
+from fpsolve.results.vtk import (
+    Facts,
+    collection_of,
+    facts_of_curve,
+    name_at,
+    pyvista_module,
+    write_points,
+    write_series,
+)
 from fpsolve.solve.eigenfunctions import Eigenfunctions
 
 CURVES = "curves.pvd"
@@ -36,12 +43,11 @@ def write_pictures(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
     """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
     if found.stationary is None:
         return
-    about = ({**curve.parameters, "curve": float(curve.number)}, curve.varied)
+    facts = facts_of_curve(curve)
     if curve.number == 1 and found.has_density:
-        write_density(folder / "density.vtu", found.stationary, *about)
+        write_density(folder / "density.vtu", found.stationary, facts)
     if found.pairs:
-        write_text(folder / "show.py", files("fpsolve.results").joinpath("show.py").read_text(encoding="utf-8"))
-        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", *about)
+        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", facts)
 
 
 def write_eigenfunctions(
@@ -49,30 +55,26 @@ def write_eigenfunctions(
     pairs: Sequence[PrincipalPair],
     stationary: PrincipalPair,
     stem: str = "eigenfunctions",
-    parameters: Facts = MappingProxyType({}),
-    varied: Collection[str] = (),
+    facts: Facts = MappingProxyType({}),
 ) -> list[Path]:
     """Write `<stem>.pvd`, a time series over p, and `<stem>/p….vtu`, one file for each p.
 
     Point data: `T`; `T_adjoint`, T*; `tilted_density`, T T*; `stationary_density`, T* at p = 0; `z` = ξ/std.
     T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
     ∫T T* dφ dξ = 1. Where the noise has states `z` is the number of one, and densities are per radian.
-    Field data: `p`; `Lambda`, Λ(p); each of the parameters; and in words, with units, `varied`, those
-    that are varied, and `held`, the others; `impacts`, where T jumps, and `along_y`, what stands along y.
+    Field data: `p`; `Lambda`, Λ(p); `impacts`, where T jumps; `along_y`, what stands along y; and the facts, those of a
+    case its parameters and, in words with units, `varied`, those that are varied, and `held`, the others.
 
     Args:
         directory: the folder, made where it is missing.
         pairs: the eigenpairs, at most one of them written for each p.
         stationary: the pair at p = 0 of the same oscillator and noise, on any mesh.
         stem: name of the collection and of the folder of its files.
-        parameters: of the oscillator and the noise, by dotted keys such as "noise.D0".
-        varied: the keys of those that differ between curves.
+        facts: more field data, numbers or texts by their names.
 
     Returns:
         The files written, the collection first.
     """
-    problem = stationary.generator.problem
-    facts = field_data(parameters, varied, problem)
 
     def write(path: Path, pair: PrincipalPair) -> None:
         grid = Nodes.of(pair)
@@ -86,13 +88,12 @@ def write_eigenfunctions(
 def write_density(
     path: Path,
     stationary: PrincipalPair,
-    parameters: Facts = MappingProxyType({}),
-    varied: Collection[str] = (),
+    facts: Facts = MappingProxyType({}),
 ) -> Path:
     """Write the stationary density of (φ, ξ), per radian and unit of ξ, with its marginals, to a `.vtu` file.
 
     Point data: `stationary_density`, which ParaView shows first, `phi_marginal`, `xi_marginal`, `z`. Field data:
-    `lyapunov_exponent`, λ; `p` and `Lambda`, which are 0; and the parameters as in `write_eigenfunctions`.
+    `lyapunov_exponent`, λ; `p` and `Lambda`, which are 0; and the facts as in `write_eigenfunctions`.
     """
     grid, space = Nodes.of(stationary), stationary.space
     rule = space.xi.samples()
@@ -102,9 +103,8 @@ def write_density(
         "xi_marginal": space.turns * xi_marginal(stationary, grid.samples(stationary)),
         "z": grid.z,
     }
-    problem = stationary.generator.problem
     known = {"p": 0.0, "Lambda": 0.0, "lyapunov_exponent": stationary.derivative}
-    _write_grid(path, grid, data, {**known, **field_data(parameters, varied, problem)})
+    _write_grid(path, grid, data, {**known, **facts})
     return path
 
 
@@ -128,12 +128,10 @@ def write_curves(case: Case, folder: Path) -> None:
         return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
     is_number = len(keys) == 1 and not case.vary.is_text(keys[0])
-    entries = [
-        (float(each.varied[keys[0]]), name, f"{each.label}, p = {p:g}")
-        if is_number
-        else (float(each.number), name, f"curve {each.number}: {each.label}, p = {p:g}")
+    entries = (
+        (float(each.varied[keys[0]] if is_number else each.number), name, f"{each.label}, p = {p:g}")
         for each, name in there
-    ]
+    )
     write_text(folder / CURVES, collection_of(sorted(entries)))
 
 

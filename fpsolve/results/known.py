@@ -20,8 +20,6 @@ from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records, key_of, made, plain
 from fpsolve.solve.sets import everything, result_of
 
-KEPT = 100
-"""So many results stay in memory, as of few curves all are asked for again."""
 ROW = "row"
 """What the entries of Λ(p) are called, before their p: a row of `Job.rows`, and the budget in which it was found."""
 
@@ -87,7 +85,6 @@ class Results(Sequence[CurveResult]):
         self.asked = everything(case, 1), everything(case, 2)
         self._names = [names_of(each, self._numerics) for each in self.asked]
         self.table, self.whole = Table(case), set[int]()
-        self._kept: dict[int, CurveResult] = {}
         self.read()
 
     def job(self, number: int, *, is_all: bool = False) -> Job:
@@ -102,8 +99,6 @@ class Results(Sequence[CurveResult]):
         number, result = job.curve.number, result_of(job)
         if job.is_whole:
             self.whole.add(number)
-        if number <= KEPT:
-            self._kept[number] = result
         self.table.put(result)
         return result
 
@@ -125,14 +120,9 @@ class Results(Sequence[CurveResult]):
         """Those of the curves of which anything is known."""
         return (1 + np.flatnonzero(np.isfinite(self.table[STATUS.name].values))).tolist()
 
-    @property
-    def telling(self) -> Iterator[CurveResult]:
-        """Those of which something is said."""
-        return (self.of(number) for number in self.numbers if self.table.messages[number - 1])
-
     def of(self, number: int) -> CurveResult:
         """That of the curve with a number."""
-        return self._kept.get(number) or result_of(self.job(number, is_all=True))
+        return result_of(self.job(number, is_all=True))
 
     def __len__(self) -> int:
         return len(self.numbers)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from glob import glob
 from pathlib import Path
@@ -14,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
-from fpsolve.files import atomic
+from fpsolve.files import write_bytes
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.known import Results
 from fpsolve.solve.curve import Status
@@ -30,9 +28,6 @@ SET = "set"
 RESULTS = "results.nc"
 ROW = "row"
 """The dimension of many runs."""
-
-
-MESSAGES = Quantity("messages", "messages", "what is said of the parameter set")
 
 
 def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> None:
@@ -60,8 +55,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
         file.dimensions = sizes | ({"p": table.p.size} if table.p.size else {})
 
         def write(name: str, dims: Iterable[str], values: NDArray[Any], about: Mapping[str, object]) -> None:
-            fill = math.nan if values.dtype.kind == "f" else None
-            file.create_variable(name, tuple(dims), values.dtype, data=values, fillvalue=fill).attrs.update(about)
+            file.create_variable(name, tuple(dims), values.dtype, data=values).attrs.update(about)
 
         for name, column in table.items():
             numbers: NDArray[Any] = column.values.reshape((*shape, *column.values.shape[1:]))
@@ -72,7 +66,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
                 about["flag_meanings"] = " ".join(each.name.lower() for each in Status)
             write(name, (*sizes, *column.quantity.dims), numbers, about)
         messages = np.array(table.messages, dtype=text).reshape(shape)
-        write(MESSAGES.name, sizes, messages, {**MESSAGES.attributes, **beside})
+        write("messages", sizes, messages, {"long_name": "what is said of the parameter set", "units": "1", **beside})
         for key in vary.keys:
             values, is_text = vary.columns[key] if is_list else vary.values(key), vary.is_text(key)
             array = np.array(values, dtype=text if is_text else float)
@@ -82,8 +76,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
         known = {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
         about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
         file.attrs.update({**about, **known, "complete": int(len(results.whole) == case.planned)})
-    with atomic(path) as draft:
-        draft.write_bytes(content.getvalue())
+    write_bytes(path, content.getvalue())
 
 
 def open_results(*places: str | Path) -> xr.Dataset:
@@ -104,11 +97,7 @@ def open_results(*places: str | Path) -> xr.Dataset:
     """
     import xarray as xr  # 430 ms, with pandas
 
-    there = [
-        path
-        for place in map(str, places)
-        for path in map(Path, [place] if os.path.exists(place) else sorted(glob(place)))  # noqa: PTH110, PTH207
-    ]
+    there = [Path(path) for place in places for path in sorted(glob(str(place))) or [str(place)]]  # noqa: PTH207
     files = [path / RESULTS if path.is_dir() else path for path in there]
     runs, count = list[xr.Dataset](), 0
     for path in files:

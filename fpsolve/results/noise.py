@@ -39,15 +39,15 @@ def noise_sections(outcome: NoiseOutcome) -> str:
 def _lines(noise: Noise, fit: NoiseFit, part: str) -> Iterator[str]:
     yield f'kind = "{noise.kind}"'
     yield from (f'{name} = "{word}"' for name, word in noise.words.items())
-    errors = fit.errors
+    errors, prefix = fit.errors, f"{part}." * (len(fit.parts) > 1)
     values = {name: each for name, each in noise.values.items() if not isinstance(each, str)}
     is_filter = noise.kind == "filter"
     for name in ("omega", "zeta", "s") if is_filter else values:
-        error = errors.get(name if len(fit.parts) == 1 else f"{part}.{name}")
+        error = errors.get(prefix + name)
         text = f"{name} = {_number(values[name], error or 0.0)}"
         yield f"{text:34}  # ± {error:.2g}" if error else text
     if is_filter:
-        error = errors.get("c1", errors.get(f"{part}.c1"))
+        error = errors.get(f"{prefix}c1")
         remark = "c0 and c1 of ξ = c0 y + c1 y′" + (f", c1 ± {error:.2g}" if error is not None else "")
         output = f"output = [{_number(values['c0'], 0.0)}, {_number(values['c1'], error or 0.0)}]"
         yield f"{output:34}  # {remark}"

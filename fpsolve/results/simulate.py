@@ -1,4 +1,4 @@
-"""The files of a simulation: monte_carlo.json, and of a stationary response a table and a .vti file."""
+"""The files of a simulation, monte_carlo.json, and of a stationary response, solved or simulated."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fpsolve.case.case import Case
+from fpsolve.case.case import Case, Curve
 from fpsolve.files import write_csv, write_json
 from fpsolve.results.csv_json import head, parameters_of, sampled
-from fpsolve.results.vtk import facts_of_curve, pyvista_module, write_vtk
-from fpsolve.solve.curve import SimulatedCurve
+from fpsolve.results.vtk import facts_of_curve, pyvista_module, write_between, write_vtk
+from fpsolve.solve.curve import CurveResponse, SimulatedCurve
 
 if TYPE_CHECKING:
     from fpsolve.simulation import Response
@@ -34,7 +34,7 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
         "response": response
         and {
             "means": {name: sampled(*each) for name, each in response.means.items()},
-            **({} if response.impact_rate is None else {"impact_rate": response.impact_rate}),
+            "impact_rate": response.impact_rate,
             "outside": response.outside,
             "time": response.time,
         },
@@ -42,10 +42,10 @@ def write_simulation(case: Case, simulated: SimulatedCurve, folder: Path) -> Non
     }
     write_json(folder / f"monte_carlo{simulated.curve.suffix}.json", content)
     if response is not None:
-        _write_response(simulated, response, folder)
+        _write_simulated(simulated, response, folder)
 
 
-def _write_response(simulated: SimulatedCurve, response: Response, folder: Path) -> None:
+def _write_simulated(simulated: SimulatedCurve, response: Response, folder: Path) -> None:
     """Write the density of the amplitude, and the joint density of x and ẋ as cell data `density` of a .vti file.
 
     Field data: `lyapunov_exponent` and its standard error, `lyapunov_exponent_error`, and the parameters as in
@@ -61,3 +61,28 @@ def _write_response(simulated: SimulatedCurve, response: Response, folder: Path)
     grid.cell_data["density"] = response.density.ravel(order="F")
     value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
     write_vtk(path, grid, {"lyapunov_exponent": value, "lyapunov_exponent_error": error, **facts_of_curve(curve)})
+
+
+def write_response(found: CurveResponse, curve: Curve, folder: Path) -> None:
+    """Write the stationary density of a curve, if it has one, as response.csv, response.vtu and response_3d.vtu.
+
+    The table has that of the amplitude. response.vtu shows both variables as x and y, with the `density` of these, and
+    `amplitude` and `phi`; response_3d.vtu shows (a, φ, ξ) as x, y and z, with the `density` of these. Field data: the
+    numbers of the response, `stability_index`, and the parameters as in `write_eigenfunctions`.
+    """
+    if found.density is None:
+        return
+    density, system = found.density, curve.problem.linear
+    rows = np.stack([density.amplitude, density.of_amplitude], axis=1).tolist()
+    write_csv(folder / f"response{curve.suffix}.csv", ["amplitude", "density"], rows)
+    about = system.response
+    known = {about.numbers[name].name: each.value for name, each in found.numbers.items()}
+    facts = {**known, "stability_index": found.stability_index, **facts_of_curve(curve)}
+    phases, of_plane = density.plane(about.has_wall)
+    a, phi = np.meshgrid(density.amplitude, phases, indexing="ij")
+    plane = {"density": of_plane, "amplitude": a, "phi": phi}
+    places = [a * np.cos(phi), -a * system.aspect * np.sin(phi), 0 * a]
+    write_between(folder / f"response{curve.suffix}.vtu", places, plane, facts)
+    places = [*np.meshgrid(density.amplitude, density.phi, density.xi, indexing="ij")]
+    whole = {"density": density.whole.astype(np.float32)}
+    write_between(folder / f"response_3d{curve.suffix}.vtu", places, whole, facts)

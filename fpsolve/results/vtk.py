@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from textwrap import wrap
 from typing import Any, TypeVar
 from xml.sax.saxutils import quoteattr
 
@@ -15,42 +14,31 @@ from fpsolve.case.case import Curve
 from fpsolve.data import written
 from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
-from fpsolve.model.problem import Problem
 from fpsolve.signals import signals_held
 
-LINE = 90
-"""Largest number of letters of a line of parameters."""
 Shown = TypeVar("Shown")
 Facts = Mapping[str, Any]
 """Field data by their names."""
 
 
-def field_data(parameters: Facts, varied: Collection[str], problem: Problem) -> Facts:
-    """The parameters, words in the name, and the words about those that a picture shows, if there are any, in ASCII."""
-    known = {key: each._replace(value=parameters[key]) for key, each in problem.parameters.items() if key in parameters}
-    words = {
-        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in varied),
-        "held": "\n".join(parameter_lines(known, varied)),
-    }
-    stated = {f"{key} = {each}" if isinstance(each, str) else key: each for key, each in parameters.items()}
-    numbers = {name: 1.0 if isinstance(each, str) else each for name, each in stated.items()}
-    return numbers | {name: text.replace("²", "^2") for name, text in words.items() if text}
-
-
 def facts_of_curve(curve: Curve) -> Facts:
-    """The field data of a curve: its number, and its parameters."""
-    return field_data({**curve.parameters, "curve": float(curve.number)}, curve.varied, curve.problem)
+    """The field data of a curve: its number, its parameters, and in words those that are varied and those held.
 
-
-def parameter_lines(parameters: Mapping[str, Parameter], besides: Collection[str] = ()) -> list[str]:
-    """All parameters besides some with their units, in lines for the system and for the noise, none of them long."""
-    sections = dict[str, list[str]]()
-    for key, parameter in parameters.items():
-        if key not in besides:
+    A parameter that is a word is in the name. The words are in ASCII, `held` with a line for each section.
+    """
+    known, sections = curve.problem.parameters, dict[str, list[str]]()
+    for key, parameter in known.items():
+        if key not in curve.varied:
             section, _, name = key.rpartition(".")
-            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}".replace(" ", "\xa0"))
-    lines = [wrap(f"{section}: {', '.join(words)}", LINE) for section, words in sections.items()]
-    return [line.replace("\xa0", " ") for each in lines for line in each]
+            sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}")
+    words = {
+        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in curve.varied),
+        "held": "\n".join(f"{section}: {', '.join(each)}" for section, each in sections.items()),
+    }
+    facts: dict[str, Any] = {"curve": float(curve.number)}
+    for key, value in curve.parameters.items():
+        facts |= {f"{key} = {value}": 1.0} if isinstance(value, str) else {key: value}
+    return facts | {name: text.replace("²", "^2") for name, text in words.items() if text}
 
 
 def _valued(parameter: Parameter) -> str:
@@ -68,13 +56,8 @@ def write_between(path: Path, places: Sequence[FloatArray], data: Mapping[str, A
         data: point data of this shape; the first is shown first.
         facts: field data.
     """
-    pyvista, numbers = pyvista_module(), np.arange(places[0].size).reshape(places[0].shape)
-    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
-    steps = square if numbers.ndim == 2 else [(*step, top) for top in (0, 1) for step in square]
-    corners = [numbers[tuple(slice(k, k - 1 or None) for k in step)].ravel() for step in steps]
-    kind = pyvista.CellType.QUAD if numbers.ndim == 2 else pyvista.CellType.HEXAHEDRON
-    points = np.stack([each.ravel() for each in places], axis=1)
-    write_points(path, pyvista.UnstructuredGrid({kind: np.stack(corners, axis=1)}, points), data, facts)
+    grid = pyvista_module().StructuredGrid(*places).cast_to_unstructured_grid()
+    write_points(path, grid, {name: values.ravel(order="F") for name, values in data.items()}, facts)
 
 
 def nodes_of_quadrilateral(degree: int) -> Sequence[tuple[int, int]]:

@@ -114,7 +114,6 @@ def test_summary_and_results_say_what_they_are_of(whole):
         assert json.loads(found.attrs["versions"])["fpsolve"] == fpsolve.__version__
         assert found.status.attrs["flag_values"].tolist() == [0, 1, 2, 3, 4, 5]
     drawn = {
-        "show.py",
         "density.vtu",
         "curves.pvd",
         *(f"eigenfunctions{k}" + end for k in ("", "-2") for end in (".pvd", "/p+2.0.vtu")),

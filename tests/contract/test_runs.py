@@ -370,9 +370,9 @@ def test_densities_of_a_response_in_all_files_are_one(response):
     assert density.sum() * step == pytest.approx(1, abs=2e-3)  # 5e-4 of it is beyond the last amplitude
     assert (density * a**2).sum() * step == pytest.approx(curve["response_amplitude_squared"], rel=5e-3)
     plane, whole = (pyvista.read(folder / f"response{name}.vtu") for name in ("", "_3d"))
-    polar = plane["density"].reshape(40, 49) * a[:, None]  # per amplitude and phase
+    polar = plane["density"].reshape(49, 40).T * a[:, None]  # per amplitude and phase
     assert simpson(polar, dx=math.pi / 48, axis=1) == pytest.approx(density, rel=1e-3)
-    table, xi = whole["density"].reshape(40, 49, 12), whole.points[:12, 2]
+    table, xi = whole["density"].reshape(12, 49, 40).T, whole.points[::1960, 2]
     assert table.sum(axis=2) * (xi[1] - xi[0]) == pytest.approx(polar, abs=4e-3 * polar.max())
     x, v = plane.points[:, 0], plane.points[:, 1]
     assert (x >= 0).all()
@@ -427,8 +427,8 @@ def test_response_of_equations_has_the_names_of_their_variables_and_agrees_with_
     for name, mean in sample.items():
         assert abs(mean["value"] - means[name]) < 5 * mean["standard_error"]
     plane = pyvista.read(folder / "response.vtu")
-    a, phi, density = (plane[name].reshape(40, -1) for name in ("amplitude", "phi", "density"))
-    np.testing.assert_allclose(plane.points[:, 1], (-2 * a * np.sin(phi)).ravel(), atol=1e-12)
+    a, phi, density = (plane[name].reshape(-1, 40).T for name in ("amplitude", "phi", "density"))
+    np.testing.assert_allclose(plane.points[:, 1], (-2 * a * np.sin(phi)).ravel("F"), atol=1e-12)
     assert phi[0, -1] - phi[0, 0] == pytest.approx(2 * math.pi)  # without a wall it is on both sides, alike
     np.testing.assert_array_equal(density[:, 1:25], density[:, 25:])
     share = 2 * np.trapezoid(density * a, dx=2 * math.pi / 48, axis=1).sum() * (a[1, 0] - a[0, 0])

@@ -1,10 +1,12 @@
-"""Draw the eigenfunctions that lie beside this file, in ParaView.
+"""Draw the eigenfunctions of a collection that fpsolve has written, in ParaView; the picture goes beside it.
 
-    pvpython show.py                                  T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
-    pvpython show.py --p 1 --field tilted_density     another p and field, saved to eigenfunctions-tilted_density.png
-    pvpython show.py --collection curves.pvd --p 3    the third curve of several, all at one p
+    pvpython docs/paraview_picture.py --collection results/fig1/eigenfunctions.pvd
 
-Where there is no display: xvfb-run -a -s -noreset pvpython show.py
+    --collection FILE.pvd                    T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
+      --p 1 --field tilted_density           another p and field, saved to eigenfunctions-tilted_density.png
+    --collection FOLDER/curves.pvd --p 3     the third curve of several, all at one p
+
+Where there is no display: xvfb-run -a -s -noreset pvpython docs/paraview_picture.py --collection FILE.pvd
 The time of eigenfunctions.pvd is p, that of curves.pvd the number of the curve, or the value of what is varied. Fields
 are divided by their maximum, and shown where a density exceeds 1e-3 of its own. Red lines are impacts, where T jumps.
 """
@@ -12,14 +14,14 @@ are divided by their maximum, and shown where a density exceeds 1e-3 of its own.
 import argparse
 from pathlib import Path
 
-from paraview import servermanager, simple  # type: ignore[import-not-found, unused-ignore]
+from paraview import servermanager, simple
 
 SYMBOLS = {"T": "T", "T_adjoint": "T*", "tilted_density": "T T*", "stationary_density": "T* at p = 0"}
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--field", default="T", choices=SYMBOLS, help="what to draw (default: T)")
 parser.add_argument("--p", type=float, help="p, or the time of another collection (default: the one nearest to 2)")
-parser.add_argument("--collection", type=Path, default=Path(__file__).with_name("eigenfunctions.pvd"))
+parser.add_argument("--collection", type=Path, required=True, help="the file, .pvd")
 chosen = parser.parse_args()
 if not chosen.collection.is_file():
     parser.error(f"there is no {chosen.collection}; name the collection with --collection FILE.pvd")
