@@ -17,12 +17,10 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from pydantic import ValidationError
 
 from fpsolve.analysis.axis import bounds_of
 from fpsolve.budget import Meter, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
-from fpsolve.case.explain import UNBOUNDED
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.rewrite import rewritten
 from fpsolve.case.sections import FigureSection, Moments, OutputSection
@@ -45,7 +43,7 @@ from fpsolve.tell.notes import notes
 from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
 from fpsolve.tell.progress import waiting
 from fpsolve.tell.reports import COMPLETE, page_of, part_of_page
-from fpsolve.tell.views import field_of, listed, map_of, paths_of, refusal
+from fpsolve.tell.views import field_of, listed, map_of, paths_of
 
 MOVING_RTOL = 1e-6
 """Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
@@ -82,8 +80,7 @@ class Explorer:
         method, kinds = choose(first), CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
         self.moves, has_square = method.is_quick, method.reason(2.0) is None
         more = USUAL_P if case.p.size < FEW and self.moves else FEWEST_P
-        more = more[more >= method.interval[0]] if method.has_pairs else more[1:]
-        p = np.union1d(case.p, more) if has_square and not {*more} <= {*case.p} else case.p
+        p = np.union1d(case.p, [each for each in more if method.reason(each) is None])
         quantities = kinds if method.has_pairs else kinds[:1]
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
         self._written = quantities[: 2 + has_square]
@@ -92,7 +89,7 @@ class Explorer:
             "moments": case.moments.model_copy(update={"p": tuple(p.tolist())}),
             "output": OutputSection(quantities=quantities), "system": first.system, "noise": first.noise,
         }  # fmt: skip
-        self.case, p = case.model_copy(update=changed), np.unique(p)
+        self.case = case.model_copy(update=changed)
         chosen = np.isin(p, (p[0], 0.0, 2.0, p[-1])) | (np.arange(p.size) % (1 + p.size // MOVING_P) == 0)
         self._few, self._drawing = p[chosen].tolist(), threading.Lock()
         self._newest, self._stopped = dict[tuple[str, str], float](), dict[str, float]()
@@ -187,11 +184,10 @@ class Explorer:
         if max(abs(low), abs(high)) < NO_BOUND:
             inset = 0.01 * (high - low)
             return low + inset * (low != round(low, 12)), high - inset * (high != round(high, 12)), False
-        if value == 0:
-            return (0.0 if low >= 0 else -1.0), 1.0, False
         if value > 0 and low >= 0:
             return value / FACTOR, min(FACTOR * value, high), True
-        return max(low, -BEYOND * abs(value)), min(BEYOND * abs(value), high), False
+        size = BEYOND * abs(value) or 1.0
+        return max(low, -size), min(size, high), False
 
     def _at(self, question: Question) -> Case:
         """The case with the values of a question. Raises `FpsolveError` where there is none."""
@@ -201,11 +197,9 @@ class Explorer:
             raise FpsolveError(f"got {values!r}; must be values by their keys, which are {', '.join(sorted(known))}")
         try:
             problem = self.first.at(values)
-        except ValidationError as failure:
-            ranges = {key.rpartition(".")[2]: each.field or UNBOUNDED for key, each in self.first.parameters.items()}
-            raise refusal(failure, ranges) from failure
         except (TypeError, ValueError) as failure:
-            raise FpsolveError(str(failure)) from failure
+            text = re.sub(r"^\w+: (?=\w+: )", "", str(failure), flags=re.MULTILINE)  # without names of classes
+            raise FpsolveError(text) from failure
         if sentence := obstacle(self.first, values, self.case.p):
             raise FpsolveError(sentence)
         return self.case.model_copy(update={"system": problem.system, "noise": problem.noise})

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
 from functools import partial
 from itertools import chain
 
 import numpy as np
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
 from fpsolve.analysis.axis import check_axes
 from fpsolve.analysis.density import stationary_density, tilted_density
 from fpsolve.analysis.scan import Scan, scan_row
-from fpsolve.analysis.target import said
 from fpsolve.arrays import FloatArray
 from fpsolve.budget import Meter, charge
 from fpsolve.case.case import Case
@@ -23,6 +22,7 @@ from fpsolve.case.sections import ChartSection
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.method import DIRECTIONS
+from fpsolve.model.faults import TableError
 from fpsolve.model.quantity import GROWTH
 from fpsolve.results.nodes import Nodes
 from fpsolve.solve.chart import Chart, begun_lines, solve_chart
@@ -41,11 +41,6 @@ PATHS, POINTS = 10, 400
 """Paths, and points of each; the motion is shown for as many steps."""
 
 
-def refusal(failure: ValidationError, fields: Mapping[str, FieldInfo]) -> FpsolveError:
-    """What is said of the values of a question."""
-    return FpsolveError("\n".join(f"{key}: {text}" for _, key, text in explain(failure.errors(), fields)))
-
-
 def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
     """The lines λ = 0 and Λ(2) = 0 over two parameters, as `chart` traces them, and the regions between them.
 
@@ -57,17 +52,18 @@ def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
     x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
     try:
         frame = ChartSection.model_validate({"x": x, "y": y, "lines": lines})
-        sides = frame.x, frame.y
-        check_axes(case.problem, *sides)
+        check_axes(case.problem, frame.x, frame.y)
     except ValidationError as failure:
-        raise refusal(failure, ChartSection.model_fields) from failure
-    except ValueError as failure:
-        raise FpsolveError(said(failure)) from failure
+        texts = [f"{key}: {text}" for _, key, text in explain(failure.errors(), ChartSection.model_fields)]
+        raise FpsolveError("\n".join(texts)) from failure
+    except TableError as failure:
+        raise FpsolveError(str(failure)) from failure
+    sides = frame.x, frame.y
     case, grid = case.model_copy(update={"chart": frame}), list[list[float | None]]()
 
     def answer(chart: Chart) -> Answer:
         return {
-            "axes": [{"key": each.key, "start": each.start, "stop": each.stop, "scale": each.scale} for each in sides],
+            "axes": [asdict(side) for side in sides],
             "grid": [*grid],
             "lines": [
                 {"name": line.target.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
@@ -148,42 +144,44 @@ def panel(
 
 def paths_of(case: Case) -> Answer:
     """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
+    from fpsolve.simulation.batches import standard_error
     from fpsolve.simulation.coefficients import coefficients, starting_state  # which takes 110 ms
     from fpsolve.simulation.kernels import RENORMALISED, advance
     from fpsolve.simulation.setup import obstacles, simulated_parts
 
     system, noise = simulated_parts(case.problem)
-    for name, sentence in obstacles(system, noise).items():
-        raise FpsolveError(f"{name}: {sentence}")
+    if told := obstacles(system, noise):
+        raise FpsolveError("; ".join(told.values()))
     known, rng = coefficients(system, noise), np.random.default_rng(case.monte_carlo.seed)
     h = known.default_step
     motion, (y, xi) = known.motion(h), starting_state(noise, PATHS, rng, known.size(h))
-    log_norm, push = np.zeros((2, PATHS))
 
-    def followed(count: int) -> Iterator[tuple[float, FloatArray, float]]:
-        """Points with the time, ln‖x‖ of all paths, and the first variable of the first one."""
+    def followed(count: int) -> tuple[FloatArray, FloatArray]:
+        """After every so many steps ln‖x‖ of all paths, and the first variable of the first one."""
+        log_norm, push = np.zeros((2, PATHS))
+        logs, first = np.zeros((POINTS + 1, PATHS)), np.zeros(POINTS + 1)
         for k in range(POINTS + 1):
-            yield k * count * h, log_norm.copy(), float(y[0, 0] * math.exp(log_norm[0]))
+            logs[k], first[k] = log_norm, y[0, 0]
             charge(PATHS)
             advance(motion, h, y, xi, log_norm, push, np.zeros(2), count, RENORMALISED, rng)
+        return logs, first * np.exp(logs[:, 0])
 
-    long = max(1, round(64 * known.transient() / h / POINTS))
+    short = h * np.arange(POINTS + 1)
+    long = short * max(1, round(64 * known.transient() / h / POINTS))
     with Meter(math.inf).running():
-        time, logs, _ = zip(*followed(long), strict=True)
-        log_norm[:] = 0.0
-        short, _, first = zip(*followed(1), strict=True)
-    if not (np.all(np.isfinite(logs)) and np.all(np.isfinite(first))):
+        logs, _ = followed(round(long[1] / h))
+        _, first = followed(1)
+    if not (np.isfinite(logs).all() and np.isfinite(first).all()):
         raise FpsolveError("the paths leave the range of numbers; take a weaker noise")
     has_wall = any(abs(math.cos(jump.phase)) < 1e-12 for jump in system.jumps)  # at x = 0
-    rates = logs[-1] / time[-1]
-    mean, error = float(np.mean(rates)), float(np.std(rates, ddof=1) / math.sqrt(PATHS))
-    rows: list[Sequence[str]] = [[f"{k + 1}", f"{each:.4g}"] for k, each in enumerate(rates)]
+    rates = logs[-1] / long[-1]
+    mean, error = float(rates.mean()), standard_error(rates)
+    rows: list[Sequence[str]] = [[f"{k}", f"{rate:.4g}"] for k, rate in enumerate(rates, 1)]
     unit = GROWTH.timed(case.units.time).unit
     grid = Grid("", [Column("path"), Column(f"ln‖x‖/t ({unit})")], rows)
-    rate = f"{sampled(mean, error)} ± {sampled(error, error)}"
-    said = Sentence(f"Their mean growth rate ({unit}) is {rate}, a standard error.")
+    said = Sentence(f"Their mean growth rate ({unit}) is {sampled(mean, error)} ± {error:.1e}, a standard error.")
     return {
-        "time": time, "logs": np.array(logs).T.tolist(), "short": short,
-        "motion": np.abs(first).tolist() if has_wall else first,
+        "time": long.tolist(), "logs": logs.T.tolist(), "short": short.tolist(),
+        "motion": (np.abs(first) if has_wall else first).tolist(),
         "name": case.problem.linear.states[0].removesuffix("₁"), "told": part_of_page([said, grid]),
     }  # fmt: skip
