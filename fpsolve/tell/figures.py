@@ -145,8 +145,7 @@ def _draw_curves(
     over = P if setting.x == "p" else case.about(setting.x)
     colours = draw_series(axes, case, series, over, setting.quantity, _dots(case, simulated))
     places = np.concatenate([item.x for item in series])
-    is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
-    scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
+    scale_axis(axes.xaxis, scale_of(places), setting.xlim)
     scale_axis(axes.yaxis, "linear", setting.ylim)
     _mark(axes, series, colours)
 
