@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +14,6 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.case import Case, Curve
-from fpsolve.case.sections import RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity
 from fpsolve.drawing import MOST_LINES, QUARTERS, Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes
 from fpsolve.exponent.density import Grid, direction_grid, on_nodes
@@ -141,9 +140,9 @@ def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Pat
     for k in chosen:
         if float(found.p[k]):
             panels.append((f"tilted, p = {float(found.p[k]):g}", found["tilted_density"][k]))
-    columns = 1 if len(panels) == 1 else 2
+    columns = min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    form = Format(width=7.2 if columns == 1 else 11.5, height=3.6 if rows == 1 else 2.6, scale=1.1)
+    form = Format(width=5.8 * columns, height=3.0, scale=1.1)
     with figure_for(paths, heading, curve.held(case.units.time), form) as figure:
         axes = np.ravel(figure.subplots(rows, columns))
         for axis, (words, values) in zip(axes, panels, strict=False):
@@ -162,13 +161,11 @@ def _of_eigenfunctions(
     is_there = case.shown.size and (folder / name_at(f"eigenfunctions{curve.suffix}", p)).is_file()
     if case.method.pictures == PHASE_AND_NOISE and is_there:
         title = f"Eigenfunction T(φ, ξ) of p = {p:g}{curve.of}"
-        yield Drawing(title, partial(_draw_eigenfunction, case, curve, p), kind="png")
+        yield Drawing(title, partial(_draw_eigenfunction, case, curve, p))
 
 
 def _draw_eigenfunction(case: Case, curve: Curve, p: float, paths: Sequence[Path], heading: str) -> None:
-    picture = draw_eigenfunction(Numerics.of(case).solver(curve.problem).pair(p), time_unit=case.units.time)
-    for path in paths:
-        picture.save(path)
+    _draw_pair(Numerics.of(case).solver(curve.problem).pair(p), "T", "viridis", case.units.time, paths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,20 +207,24 @@ def draw_eigenfunction(
     """
     if field not in FIELDS:
         raise ValueError(f"got field = {shown(field)}; must be one of {', '.join(map(repr, FIELDS))}")
+    with TemporaryDirectory() as place:
+        path = Path(place, "picture.png")
+        _draw_pair(pair, field, cmap, time_unit, [path])
+        return Picture(path.read_bytes())
+
+
+def _draw_pair(pair: PrincipalPair, field: Field, cmap: str, time_unit: str, paths: Sequence[Path]) -> None:
     problem = pair.generator.problem
     number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g} ({MOMENT.timed(time_unit).unit})"
     known = [each.quantity.timed(time_unit).stated(each.value) for each in problem.parameters.values()]
-    with TemporaryDirectory() as place:
-        path = Path(place, "picture.png")
-        with figure_for([path], number, known) as figure:
-            axes = figure.add_subplot()
-            if choose(problem).pictures == DIRECTIONS:
-                found = on_nodes(pair)
-                about = _about(field, found.grid, time_unit).attributes
-                found.grid.draw(axes, found.fields._asdict()[field], about, cmap=cmap)
-            else:
-                _draw_over_noise(pair, field, cmap, time_unit, axes)
-        return Picture(path.read_bytes())
+    with figure_for(paths, number, known) as figure:
+        axes = figure.add_subplot()
+        if choose(problem).pictures == DIRECTIONS:
+            found = on_nodes(pair)
+            about = _about(field, found.grid, time_unit).attributes
+            found.grid.draw(axes, found.fields._asdict()[field], about, cmap=cmap)
+        else:
+            _draw_over_noise(pair, field, cmap, time_unit, axes)
 
 
 def _about(field: str, grid: Grid, time_unit: str) -> Quantity:
@@ -271,10 +272,5 @@ def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -
 
 
 Figures = Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterator[Drawing]]
-FIGURES: Mapping[str, Figures] = {
-    RESPONSE: _of_response,
-    SENSITIVITIES: _of_sensitivities,
-    PHASE_AND_NOISE.part: _of_eigenfunctions,
-    DIRECTIONS.part: _of_directions,
-}
-"""Of a curve in a folder, beside its simulation if there is one, by the names of questions."""
+FIGURES: Sequence[Figures] = _of_response, _of_sensitivities, _of_eigenfunctions, _of_directions
+"""Of a curve in a folder, beside its simulation if there is one."""

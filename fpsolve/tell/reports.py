@@ -142,11 +142,10 @@ def _picture(drawing: Drawing) -> Mapping[str, str]:
     """The address that is a picture itself, or why there is none; empty where there is nothing to draw."""
     try:
         with tempfile.TemporaryDirectory() as place:
-            drawing.draw([path := Path(place, f"picture.{drawing.kind}")], "")
+            drawing.draw([path := Path(place, "picture.svg")], "")
             if not path.exists():
                 return {}
-            kind = "svg+xml" if drawing.kind == "svg" else drawing.kind
-            return {"source": f"data:image/{kind};base64,{b64encode(path.read_bytes()).decode()}"}
+            return {"source": f"data:image/svg+xml;base64,{b64encode(path.read_bytes()).decode()}"}
     except Exception as failure:  # the numbers shall not be lost for a picture
         reason = str(failure) if isinstance(failure, FpsolveError) else f"{type(failure).__name__}: {failure}"
         return {"source": "", "missing": str(Message(Code.NO_PICTURE, reason=reason))}
