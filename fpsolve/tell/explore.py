@@ -57,7 +57,7 @@ from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
 from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
 from fpsolve.tell.progress import waiting
-from fpsolve.tell.reports import COMPLETE, page_of, part_of_page
+from fpsolve.tell.reports import page_of, part_of_page
 from fpsolve.tell.text import sampled
 
 MOVING_RTOL = 1e-6
@@ -74,16 +74,14 @@ FACTOR = 10.0
 """From a positive value to the ends of its slider, where nothing says how far it may go."""
 BEYOND = 3.0
 """The same of a value of any sign."""
-MOST_EQUATIONS = 6
-"""Lines of the equations of motion that the page shows; more would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "classes", "discretisation"}
 """The parts that are solved."""
 PIXELS = 144, 72
 """Of a picture, each way."""
-SHOWN = 9, 5
-"""Rows and columns of its table."""
+STEP = 16
+"""So many pixels apart, either way, are the numbers of its table."""
 PATHS, POINTS = 10, 400
 """Paths, and points of each; the motion is shown for as many steps."""
 
@@ -251,14 +249,13 @@ class Explorer:
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
-        equations = equations_of(case.system)
         columns = moments.p, moments.value, moments.derivative, moments.error_estimate
         index, exponent = result.stability_index, result.lyapunov_exponent
         return {
             "curve": [listed(each[order]) for each in columns],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": equations if len(equations) <= MOST_EQUATIONS else [],
+            "equations": equations_of(case.system),
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
             "numbers": part_of_page([*indices(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
@@ -301,7 +298,6 @@ class Explorer:
                 case,
                 chain(results.show(case, [found], Path()), notes(case, [found], "")),
                 started,
-                state=COMPLETE,
                 file=f"{self.source.name}-explored.toml",
                 more="`fpsolve run` of the case below writes all numbers.",
                 case_text=self._text(case) if self.source.text else "",
@@ -428,9 +424,8 @@ def panel(
     pixels = np.array([column[near] if is_chain else np.interp(v, y, column) for column in rows.T])
     ends = [[u[0], u[-1]], [v[0], v[-1]]]
     picture: Answer = {"title": title, "ends": ends, "names": names, "values": [*map(listed, pixels)]}
-    i, j = (np.linspace(0, size - 1, count).round().astype(int) for size, count in zip(PIXELS, SHOWN, strict=True))
-    columns = [Column(" \\ ".join(names)), *(Column(f"{each:.3g}") for each in v[j])]
-    cells = np.column_stack([u[i], pixels[np.ix_(i, j)]])
+    columns = [Column(" \\ ".join(names)), *(Column(f"{each:.3g}") for each in v[::STEP])]
+    cells = np.column_stack([u, pixels[:, ::STEP]])[::STEP]
     return picture, Grid(title, columns, [[f"{each:.4g}" for each in row] for row in cells])
 
 

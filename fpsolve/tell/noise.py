@@ -11,9 +11,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from fpsolve.analysis.spreads import LEVEL
-from fpsolve.arrays import FloatArray
 from fpsolve.drawing import figure_for, label_axes, plain_numbers
-from fpsolve.measured import NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
 from fpsolve.solve.noise import Critical, NoiseOutcome, density_of
@@ -53,16 +51,6 @@ class Convention:
         return f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
 
 
-def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
-    """Ends of the interval that holds S with `LEVEL` by each measured value, of the law of a mean of periodograms."""
-    spectrum = fit.spectrum
-    if spectrum.relative_error is None:
-        return None
-    freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)
-    low, high = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
-    return low, high
-
-
 def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
     """noise.png and .pdf: what was measured with its 95 % interval, what was fitted, the frequencies that matter."""
     fit, noise_in = outcome.fit, outcome.wanted.noise_in
@@ -76,8 +64,10 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
     density = factor * spectrum.density
     with figure_for(paths, title) as figure:
         axes = figure.subplots()
-        if (band := band_of(fit)) is not None:
-            axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
+        if spectrum.relative_error is not None:
+            freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)  # of the law of a mean of periodograms
+            low, high = (density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
+            axes.fill_between(x, low, high, color="0.75", linewidth=0, label=f"{LEVEL:.0%} interval")
         axes.loglog(x, density, ".", color="0.35", label="formula" if spectrum.is_formula else "measured")
         values, _ = density_of(fit, fine.tolist())
         axes.loglog(fine / shown.unit, factor * values, label="fitted")
@@ -129,7 +119,10 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
     if outcome.verdict is None:
         if outcome.failure is None:
-            yield _missing(outcome)
+            is_one = len(outcome.wanted.modes.omega) == 1
+            remedy = "an oscillator state its damping by --damping-ratio."
+            of_two = "two modes state their case by --case; `fpsolve new coupled` copies one."
+            yield f"For λ and Λ(2) of {remedy if is_one else of_two}"
         return
     is_formula = outcome.fit.spectrum.is_formula
     for symbol, each, what in (
@@ -147,13 +140,6 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     share = outcome.fit.off
     off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
-
-
-def _missing(outcome: NoiseOutcome) -> str:
-    """What to do for λ and Λ(2)."""
-    if len(outcome.wanted.modes.omega) > 1:
-        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new coupled` copies one."
-    return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
 
 
 def _percent(each: Critical) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -271,6 +271,5 @@ def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
-Figures = Callable[[Case, CurveResult, Path, SimulatedCurve | None], Iterator[Drawing]]
-FIGURES: Sequence[Figures] = _of_response, _of_sensitivities, _of_eigenfunctions, _of_directions
+FIGURES = _of_response, _of_sensitivities, _of_eigenfunctions, _of_directions
 """Of a curve in a folder, beside its simulation if there is one."""
