@@ -120,7 +120,8 @@ def show(case: Case, chart: Chart) -> Iterator[Block]:
 
 def chart_grid(case: Case, chart: Chart) -> Grid:
     """The branches of every line, and their special points."""
-    names = short_names([charted(case).x.key, charted(case).y.key])
+    keys = charted(case).x.key, charted(case).y.key
+    names = short_names(keys)
     columns = [Column("line"), Column("branch", 1), Column("points", 2), *map(Column, names)]
     grid = Grid("", [*columns, Column("special point", is_text=True)])
     for line in chart.lines:
@@ -129,6 +130,8 @@ def chart_grid(case: Case, chart: Chart) -> Grid:
             grid.rows.append([line.target.equation, str(number), count, "", "", ""])
             for i, label in enumerate(branch.labels):
                 if label:
+                    for key, name in zip(keys, names, strict=True):
+                        label = label.replace(key, name)
                     grid.rows.append(["", "", "", f"{branch.x[i]:.7g}", f"{branch.y[i]:.7g}", label])
             grid.ends.add(len(grid.rows) - 1)
     return grid

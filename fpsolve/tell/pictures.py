@@ -20,19 +20,17 @@ from fpsolve.exponent.density import Grid, direction_grid, on_nodes
 from fpsolve.exponent.eigen import PrincipalPair
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS, PHASE_AND_NOISE
-from fpsolve.model.plane import LinearMotion
 from fpsolve.model.quantity import MOMENT, PHASE
 from fpsolve.results.directions import directions_file
 from fpsolve.results.nodes import FIELDS, Nodes
 from fpsolve.results.vtk import name_at
-from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity, SimulatedCurve
+from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.solve.question import Numerics
 from fpsolve.tell.blocks import Drawing
 from fpsolve.theory.perturbation import scale_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
 
 FINER = 2
 """So many times as many nodes either way as a file for ParaView has; there they carry polynomials."""
@@ -54,36 +52,30 @@ def _of_response(case: Case, result: CurveResult, folder: Path, simulated: Simul
         return
 
     def draw(paths: Sequence[Path], heading: str) -> None:
-        of = curve.problem.linear.response
+        motion = curve.problem.linear
+        of, a = motion.response, density.amplitude[:, None]
+        phi, of_plane = density.plane(of.has_wall)
+        quantities = of.first, of.second, of.density, of.amplitude, of.amplitude_density
+        x, v, of_both, amplitude, of_amplitude = (each.timed(case.units.time).attributes for each in quantities)
+        most = float(density.of_plane.max())
+        least = 1e-4 * most  # what is below has its colour
         with figure_for(paths, heading, curve.held(case.units.time), Format(width=10.5)) as figure:
             plane, radial = figure.subplots(1, 2)
-            _draw_joint_density(plane, found, density, curve.problem.linear, case)
+            places, shown = (a * np.cos(phi), -motion.aspect * a * np.sin(phi)), np.maximum(of_plane, least)
+            draw_colours(plane, *places, shown, of_both, norm="log", vmin=least, vmax=most, shading="gouraud")
+            label_axes(plane, x, v)
+            plane.set_title(_at_rest("a crater around rest", found.stability_index, -2))
             radial.plot(density.amplitude, density.of_amplitude, label="finite elements")
-            label_axes(
-                radial, *(each.timed(case.units.time).attributes for each in (of.amplitude, of.amplitude_density))
-            )
+            label_axes(radial, amplitude, of_amplitude)
             end = density.amplitude[0] + density.amplitude[-1]
             radial.set(xlim=(0, end), ylim=(0, 1.1 * float(density.of_amplitude.max())))
             radial.set_title(_at_rest("a hump away from rest", found.stability_index, -1))
             if sample := simulated and simulated.response:
-                x = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
-                dots = x, sample.amplitude_density, sample.amplitude_error
+                middles = 0.5 * (sample.amplitude_edges[1:] + sample.amplitude_edges[:-1])
+                dots = middles, sample.amplitude_density, sample.amplitude_error
                 draw_dots(radial, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black")
 
     yield Drawing(f"Stationary response{curve.of}", draw, f"response{curve.suffix}", case.headline)
-
-
-def _draw_joint_density(
-    axes: Axes, found: CurveResponse, density: ResponseDensity, system: LinearMotion, case: Case
-) -> None:
-    """ρ of both variables in colours over four decades; what is below has the colour of the lowest."""
-    of = system.response
-    about, x, v = (each.timed(case.units.time).attributes for each in (of.density, of.first, of.second))
-    a, (phi, of_plane), most = density.amplitude[:, None], density.plane(of.has_wall), float(density.of_plane.max())
-    places, shown = (a * np.cos(phi), -system.aspect * a * np.sin(phi)), np.maximum(of_plane, 1e-4 * most)
-    draw_colours(axes, *places, shown, about, norm="log", vmin=1e-4 * most, vmax=most, shading="gouraud")
-    label_axes(axes, x, v)
-    axes.set_title(_at_rest("a crater around rest", found.stability_index, -2))
 
 
 def _at_rest(words: str, index: float | None, limit: int) -> str:
@@ -214,6 +206,7 @@ def draw_eigenfunction(
 
 
 def _draw_pair(pair: PrincipalPair, field: Field, cmap: str, time_unit: str, paths: Sequence[Path]) -> None:
+    """An eigenfunction with what it is of, into files."""
     problem = pair.generator.problem
     number = f"p = {pair.p:g}, {MOMENT.symbol} = {round(pair.value, 14) + 0.0:.6g} ({MOMENT.timed(time_unit).unit})"
     known = [each.quantity.timed(time_unit).stated(each.value) for each in problem.parameters.values()]
