@@ -46,10 +46,6 @@ class Convention:
     def symbol(self) -> str:
         return "f" if self.per == "Hz" else "ω"
 
-    def unit_of_density(self, noise_in: str) -> str:
-        per = "Hz" if self.per == "Hz" else "(rad/s)"
-        return f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
-
 
 def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
     """noise.png and .pdf: what was measured with its 95 % interval, what was fitted, the frequencies that matter."""
@@ -83,7 +79,9 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
             plain_numbers(axis)
         frequency = {"long_name": "frequency", "symbol": f"${shown.symbol}$", "units": shown.per}
         about = {"long_name": f"{shown.sided}-sided density of {words}", "symbol": f"$G({shown.symbol})$"}
-        label_axes(axes, frequency, about | {"units": shown.unit_of_density(noise_in)})
+        per = "Hz" if shown.per == "Hz" else "(rad/s)"
+        unit = f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
+        label_axes(axes, frequency, about | {"units": unit})
 
 
 def show(outcome: NoiseOutcome, source: Path, shown: Convention) -> Iterator[Block]:

@@ -136,13 +136,11 @@ def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Pat
     rows = -(-len(panels) // columns)
     form = Format(width=5.8 * columns, height=3.0, scale=1.1)
     with figure_for(paths, heading, curve.held(case.units.time), form) as figure:
-        axes = np.ravel(figure.subplots(rows, columns))
-        for axis, (words, values) in zip(axes, panels, strict=False):
-            grid.draw(axis, values.values, {"long_name": "density", "units": grid.unit}, vmin=0.0)
+        for place, (words, values) in enumerate(panels, 1):
+            axes = figure.add_subplot(rows, columns, place)
+            grid.draw(axes, values.values, {"long_name": "density", "units": grid.unit}, vmin=0.0)
             means = (f": mean {each.symbol} {mean:.1%}" for each, mean in grid.means(values.values).items())
-            axis.set_title("".join([words, *means]), parse_math=False)
-        for axis in axes[len(panels) :]:
-            axis.set_axis_off()
+            axes.set_title("".join([words, *means]), parse_math=False)
 
 
 def _of_eigenfunctions(
