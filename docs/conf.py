@@ -55,7 +55,10 @@ sphinx_gallery_conf = {
 html_theme = "pydata_sphinx_theme"
 html_title = "fpsolve"
 html_static_path = ["_static"]
-html_sidebars = {page: [] for page in ("start", "theory", "validation", "performance", "contributing")}
+html_sidebars = {
+    page: []
+    for page in ("start", "theory", "validation", "performance", "contributing", "extending", "inside", "tests")
+}
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False

@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import chain, islice, pairwise
 from time import thread_time
-from typing import Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from contourpy import contour_generator
-from scipy.interpolate import BPoly
 
 from fpsolve.arrays import FloatArray, ReadOnly
 from fpsolve.errors import FpsolveError
@@ -92,6 +91,8 @@ class Scan(ReadOnly):
         The mixed derivatives at the nodes are differences of the gradients; 0 beside missing ones.
         """
 
+        from scipy.interpolate import BPoly  # 70 ms, of which only charts have need
+
         def along(values: FloatArray, slopes: FloatArray) -> FloatArray:
             return np.asarray(BPoly.from_derivatives(self.nodes, np.stack([values, slopes], axis=1))(points))
 
@@ -108,7 +109,7 @@ class Scan(ReadOnly):
         """
         finer = np.linspace(0, 1, FINE * (self.nodes.size - 1) + 1)
         values = np.ma.masked_invalid(self.on(finer))
-        lines = cast("list[FloatArray]", contour_generator(finer, finer, values.T, line_type="Separate").lines(0.0))
+        lines: Any = contour_generator(finer, finer, values.T, line_type="Separate").lines(0.0)
         for start, end in chain.from_iterable(map(pairwise, lines)):
             if (along := end - start).any():
                 yield Sample(0.5 * (start + end), 0.0, np.array([-along[1], along[0]]), 0.0, 0.0)

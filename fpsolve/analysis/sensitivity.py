@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -196,8 +196,7 @@ def solve_sensitivities(
         return {}
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
-    solves: dict[str, Callable[[], Mapping[str, Estimate]]]
-    solves = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
+    solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
     slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
     values = problem.values
     noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)

@@ -14,7 +14,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import repeat
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,7 +34,6 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P
 
 if TYPE_CHECKING:
     import xarray
-    from scipy.stats._distn_infrastructure import rv_continuous_frozen
 
 LEVEL = 0.95
 """The probability that an interval holds."""
@@ -61,14 +60,13 @@ def deviation_of(stated: Stated, value: float) -> float:
         stated: 0.05, a share of the value, or {"sd": 0.02}, a number.
         value: of the parameter.
     """
-    is_number = isinstance(stated, Mapping) and stated.keys() == {"sd"}
-    size = stated["sd"] if isinstance(stated, Mapping) and is_number else stated
+    size = stated["sd"] if isinstance(stated, Mapping) and stated.keys() == {"sd"} else stated
     if isinstance(size, bool) or not isinstance(size, int | float) or not 0 < size < math.inf:
         raise ValueError(
             f"got {shown(stated)}; must be a share of the value, such as 0.05, or a standard deviation such as "
             '{"sd": 0.02}, > 0 and finite'
         )
-    return float(size) if is_number else size * abs(value)
+    return size * abs(value) if size is stated else float(size)
 
 
 @dataclass(frozen=True)
@@ -87,7 +85,7 @@ class Law:
     high: float = math.inf
 
     @property
-    def _cut(self) -> rv_continuous_frozen:
+    def _cut(self) -> Any:
         """The law that is cut."""
         from scipy.stats import truncnorm  # as above
 

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal
 
 from fpsolve.arrays import is_whole, shown
@@ -209,14 +209,13 @@ class Index(Quantity):
 def _index(
     quantity: Quantity,
     solve: Callable[[ExponentSolver], Estimate | Absent],
-    interval: tuple[float, float] = (-math.inf, math.inf),
 ) -> Index:
     """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
 
     def theory(problem: Problem) -> float:
         return float(getattr(second_order_or_none(problem), quantity.name, math.nan))
 
-    return Index(**vars(quantity), solve=solve, theory=theory, interval=interval)
+    return Index(**vars(quantity), solve=solve, theory=theory)
 
 
 def _restitution_by_theory(problem: Problem) -> float:
@@ -225,7 +224,7 @@ def _restitution_by_theory(problem: Problem) -> float:
 
 
 LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = _index(quantity.STABILITY_INDEX, nonzero_root, interval=SEARCH_INTERVAL)
+STABILITY_INDEX: Index = replace(_index(quantity.STABILITY_INDEX, nonzero_root), interval=SEARCH_INTERVAL)
 VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver: solver.variance_rate())
 IMPACT_RATE = _index(quantity.IMPACT_RATE, impact_rate)
 CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)

@@ -71,9 +71,9 @@ class Start(Stage):
 
     def doubled(self, failure: Exception | None) -> Start | None:
         """More functions along the axes that lack most, by the pair that a failed search has reached, if any."""
-        pair = failure.partial if isinstance(failure, NotConverged) else None
-        is_near = isinstance(pair, PrincipalPair) and pair.residual <= BACKWARD_ERROR_LIMIT
-        found = self.space.doubled(mode_effects(pair) if isinstance(pair, PrincipalPair) and is_near else ())
+        pair: Any = failure.partial if isinstance(failure, NotConverged) else None
+        is_near = pair is not None and pair.residual <= BACKWARD_ERROR_LIMIT
+        found = self.space.doubled(mode_effects(pair) if is_near else ())
         return replace(self, space=found) if found.size > self.space.size else None
 
     def refined(self, solution: Solution, goal: float, most: int) -> Start:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +13,6 @@ from fpsolve.arrays import FloatArray, IntArray
 from fpsolve.model.coordinates import framed
 from fpsolve.model.plane import squared_frequency
 from fpsolve.model.problem import Problem
-
-if TYPE_CHECKING:
-    from fpsolve.model.noises.filter import Filter
 
 SAMPLES = 601
 """Number of values of a noise on each side, and of amplitudes of its swings."""
@@ -71,7 +68,7 @@ def swing(problem: Problem, p: float) -> tuple[float, float]:
     The rate is p⟨G⟩ − a²/4S(ω), the mean over a turn of ωt; where S is larger than at 0 it may exceed that of
     `steady_places`.
     """
-    noise = cast("Filter", problem.valued)
+    noise: Any = problem.valued
     peak = noise.omega * math.sqrt(max(1 - 2 * noise.zeta**2, 0.0))
     spectrum = max(noise.spectral_density(each) for each in (peak, *(noise.omega * FREQUENCIES)))
     a = 4 * abs(p) * _noise_strength(problem) * spectrum * np.linspace(0, 1, SAMPLES)

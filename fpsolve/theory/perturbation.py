@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,11 +53,10 @@ class Scale:
     linear: float
     quadratic: float
 
-    def moment(self, p: ArrayLike) -> FloatArray:
+    def moment(self, p: ArrayLike) -> Any:
         """The scale of Λ(p); that of λ is `linear`, that of Λ″(0) 2 `quadratic`."""
         size = np.abs(np.asarray(p, dtype=float))
-        found: FloatArray = (size * (self.linear + self.quadratic * size))[()]
-        return found
+        return (size * (self.linear + self.quadratic * size))[()]
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,10 @@ class SecondOrder:
     impact_rate: float
     log_factor: float
 
-    def moment_exponent(self, p: ArrayLike) -> FloatArray:
+    def moment_exponent(self, p: ArrayLike) -> Any:
         """ε²Λ₂(p), Eq. (37); an array for an array of p."""
         p = np.asarray(p, dtype=float)
-        found: FloatArray = (p * (self.quadratic * p + self.lyapunov_exponent) + 0.0)[()]  # 0 without a sign
-        return found
+        return (p * (self.quadratic * p + self.lyapunov_exponent) + 0.0)[()]  # 0 without a sign
 
     @property
     def lyapunov_exponent(self) -> float:

@@ -12,6 +12,7 @@ from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
 import pytest
+from cyclopts import App
 from numpy.testing import assert_allclose
 
 import fpsolve
@@ -94,13 +95,19 @@ def test_every_room_has_a_page_of_reference():
     assert all(f"/generated/reference/{room}\n" in index for room in rooms)
 
 
-def test_format_and_command_of_the_page_on_contributing_give_numbers_of_a_case(tmp_path, capsys):
+def test_format_command_and_picture_of_the_pages_are_of_a_case(tmp_path, capsys):
     names, _ = typed(ROOT / "docs/contributing.md")
     case = fpsolve.load_case(CASES / "minimal.toml")
-    names["write_lines"](case, solve_case(case), tmp_path / "lines.txt")
+    results = solve_case(case)
+    typed(ROOT / "docs/extending.md")[0]["write_lines"](case, results, tmp_path / "lines.txt")
     assert "curve 1, lyapunov_exponent = " in (tmp_path / "lines.txt").read_text(encoding="utf-8")
+    for each in names["law"](case, results[0], tmp_path, None):
+        each.write(tmp_path)
+    assert (tmp_path / "law.png").exists()
+    app = App()
+    app.command(names["variance"])
     arguments = ["variance", str(case.path), "--set", "noise.D0=2.0"]
-    assert names["app"](arguments, result_action="return_value") == 0
+    assert app(arguments, result_action="return_value") == 0
     variance = case.problem.at({"noise.D0": 2.0}).noise.standard_deviation ** 2
     assert float(capsys.readouterr().out.rpartition(": ")[2]) == pytest.approx(variance, rel=1e-5)
 
@@ -120,8 +127,8 @@ def test_population_of_the_noise_of_the_page_has_the_number_of_the_elements():
     assert abs(found.value - moment_lyapunov(problem, 4.0).value) <= 3 * found.standard_error < 0.01
 
 
-def test_noise_and_system_of_the_page_on_contributing_are_what_those_that_ship_are():
-    names, _ = typed(ROOT / "docs/contributing.md")
+def test_noise_and_system_of_the_page_on_extending_are_what_those_that_ship_are():
+    names, _ = typed(ROOT / "docs/extending.md")
     own = Problem(names["Pendulum"](length=1.0, damping=0.1), names["Wind"](size=0.5**0.5, duration=1.0))
     known = Problem(ParametricOscillator(1.0, 0.1), OrnsteinUhlenbeckByDeviation(1.0, 0.5**0.5))
     damping = Axis("system.damping", 0.1, 0.6)

@@ -1,4 +1,4 @@
-"""What runs for Λ(2) of Fig. 1: functions that the page on contributing names, and the libraries that do the work."""
+"""What runs for Λ(2) of Fig. 1: functions that the page on it names, and the libraries that do the work."""
 
 import re
 import subprocess
@@ -23,7 +23,7 @@ OF_LIBRARIES = {"Dofs.__init__", "get_quadrature", "ElementLinePp.lbasis", "Mesh
 
 
 def test_walk_names_functions_that_run_and_libraries_do_the_work(tmp_path):
-    walk = (ROOT / "docs/contributing.md").read_text(encoding="utf-8").partition("## A walk")[2].partition("\n## ")[0]
+    walk = (ROOT / "docs/inside.md").read_text(encoding="utf-8").partition("\n## ")[0]
     names = set(re.findall(r"`(\w+(?:\.\w+)?)`", walk))
     program = [sys.executable, "-c", PROGRAM, str(CASES / "minimal.toml")]
     found = subprocess.run(program, cwd=tmp_path, check=True, capture_output=True, text=True, env={"PYTHONPATH": ROOT})

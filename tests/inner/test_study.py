@@ -26,10 +26,10 @@ MINIMAL = CASES / "minimal.toml"
 
 
 @pytest.mark.slow
-def test_quantity_and_question_of_the_page_on_contributing_are_solved_and_tabulated(monkeypatch):
+def test_quantity_and_question_of_the_pages_are_solved_and_tabulated(monkeypatch):
     """The chance that Gaussian noise is above a level, as the complementary error function has it."""
-    names, _ = typed(ROOT / "docs/contributing.md")
-    index, chance = names["index"], names["question"]
+    index = typed(ROOT / "docs/contributing.md")[0]["index"]
+    chance = typed(ROOT / "docs/extending.md")[0]["question"]
     question = indices.question_of(index)
     monkeypatch.setitem(INDICES, index.name, index)
     for module in (solve, table):
