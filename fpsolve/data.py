@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from html import escape
 from textwrap import fill
 from typing import TYPE_CHECKING, Self
@@ -72,10 +72,10 @@ class Quantity:
     @property
     def attributes(self) -> dict[str, str]:
         """Those of a variable of xarray: long_name, symbol, units, equation and comment; no empty ones."""
-        names = {"long_name": "words", "symbol": "latex", "units": "unit", "equation": "equation", "comment": "comment"}
-        found = {name: text for name, own in names.items() if (text := getattr(self, own))}
         is_key = "." in self.name and self.words == self.name
-        return found | ({"long_name": f"parameter {'' if self.latex else self.shown}".rstrip()} if is_key else {})
+        words = f"parameter {'' if self.latex else self.shown}".rstrip() if is_key else self.words
+        about = {"symbol": self.latex, "units": self.unit, "equation": self.equation, "comment": self.comment}
+        return {name: text for name, text in {"long_name": words, **about}.items() if text}
 
     @property
     def title(self) -> str:
@@ -101,26 +101,21 @@ class Quantity:
         unit = "" if self.unit in ("1", "unknown") else f" {typeset(self.unit)}"
         return f"{self.shown} = {written(value)}{unit.removeprefix(' 1')}"
 
-    @property
-    def _plain(self) -> Quantity:
-        """The quantity without what a subclass adds."""
-        return Quantity(**{each.name: getattr(self, each.name) for each in fields(Quantity)})
-
     def error(self, kind: str = "estimated error") -> Quantity:
         """Its error, of a kind such as "standard error"; where it is estimated, the comment says from what."""
         comment = f"from {self.error_source}" if kind == "estimated error" and self.error_source else ""
-        return replace(self._plain, name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
+        return replace(self, name=f"{self.name}_error", words=f"{kind} of the {self.words}", comment=comment)
 
     def end(self, which: str, level: float) -> Quantity:
         """The "low" or the "high" end of an interval that holds it with a probability."""
         words = f"{which} end of the interval that holds the {self.words} with {level:.0%}"
-        return replace(self._plain, name=f"{self.name}_{which}", words=words)
+        return replace(self, name=f"{self.name}_{which}", words=words)
 
     @property
     def perturbation(self) -> Quantity:
         """What perturbation theory makes of it."""
         name, words = f"{self.name}_perturbation", f"{self.words} by perturbation theory"
-        return replace(self._plain, name=name, words=words, equation=self.closed_form)
+        return replace(self, name=name, words=words, equation=self.closed_form)
 
     def by(self, other: Quantity) -> Quantity:
         """Its partial derivative by another one."""

@@ -216,8 +216,12 @@ def draw(found: xarray.Dataset, axes: Axes, **kwargs: Any) -> None:
     """Draw the first variable of a dataset with its error: a point, a line or colours, by its dimensions."""
     main = next(iter(found.data_vars.values()))
     error = found.get(f"{main.name}_error")
-    if main.ndim == 0:
-        draw_point(axes, main, error, **kwargs)
+    if main.ndim == 0:  # above its symbol, as several stand side by side
+        size = None if error is None else [error.item()]
+        axes.errorbar([str(main.attrs.get("symbol", main.name))], [main.item()], size, **{**DOTS, **kwargs})
+        axes.set_ylabel(label_of(main.attrs))
+        axes.axhline(0, **ZERO)
+        axes.margins(x=0.3)
     elif main.ndim == 1:
         draw_line(axes, main, error, **{"label": found.attrs["method"], **kwargs})
     else:
@@ -243,16 +247,6 @@ def draw_line(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None
 def draw_dots(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, **kwargs: Any) -> None:
     """Dots with bars of ± two standard errors."""
     axes.errorbar(x, y, 2 * error, **{**DOTS, **kwargs})
-
-
-def draw_point(axes: Axes, main: xarray.DataArray, error: xarray.DataArray | None, **kwargs: Any) -> None:
-    """One number with a bar of ± its error, above its symbol; several stand side by side."""
-    name = str(main.attrs.get("symbol", main.name))
-    size = None if error is None else [error.item()]
-    axes.errorbar([name], [main.item()], size, **{**DOTS, **kwargs})
-    axes.set_ylabel(label_of(main.attrs))
-    axes.axhline(0, **ZERO)
-    axes.margins(x=0.3)
 
 
 def draw_plane(axes: Axes, main: xarray.DataArray, **kwargs: Any) -> None:

@@ -3,7 +3,7 @@ from .blocks import Grid as Grid
 from .blocks import Note as Note
 from .blocks import Sentence as Sentence
 from .curves import curve_grid as curve_grid
-from .eigenfunctions import draw_eigenfunction as draw_eigenfunction
+from .pictures import draw_eigenfunction as draw_eigenfunction
 from .progress import Phase as Phase
 from .progress import Watch as Watch
 from .reports import page_of as page_of

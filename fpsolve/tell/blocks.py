@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from fpsolve.messages import Severity
 
@@ -80,14 +79,12 @@ class Drawing:
         draw: draws it with a heading into files, or does not where there is nothing to draw.
         name: of its own files; empty where it has none.
         heading: in these; a page has one itself.
-        kind: of the file for a page.
     """
 
     title: str
     draw: Callable[[Sequence[Path], str], None]
     name: str = ""
     heading: str = ""
-    kind: Literal["svg", "png"] = "svg"
 
     def write(self, folder: Path) -> None:
         """Draw it as .png and .pdf into a folder, if it has files of its own."""

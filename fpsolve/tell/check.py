@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from fpsolve.case.case import Case
-from fpsolve.data import short_names, written
+from fpsolve.data import written
 from fpsolve.exponent.error import digits
 from fpsolve.solve.check import Comparison
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
@@ -31,29 +31,20 @@ def agreement(comparisons: Sequence[Comparison]) -> str:
 
 
 def _grid(case: Case, comparisons: Sequence[Comparison], *, is_short: bool) -> Grid:
-    """A row for each value: with its source, or in one line, with two digits more than the tolerance has."""
-    first = (
-        [Column("quantity"), *map(Column, short_names(case.vary.keys))]
-        if is_short
-        else [Column("quantity", is_text=True)]
-    )
-    tolerance = [Column("±", 2)] if is_short else []
-    numbers = [Column("expected"), *tolerance, Column("computed"), Column("difference", 1), Column("")]
-    grid = Grid(f"{case.name}: {case.headline}", [*first, *numbers])
+    """A row for each value: in one line, or with its source, with two digits more than the tolerance has."""
+    numbers = Column("expected"), Column("±", 2), Column("computed"), Column("difference", 1), Column("")
+    grid = Grid(f"{case.name}: {case.headline}", [Column("quantity", is_text=True), *numbers])
     for item in comparisons:
-        wanted, value = item.expectation, item.value
+        wanted, value, error = item.expectation, item.value, item.tolerance
         quantity = wanted.quantity if wanted.p is None else f"{wanted.quantity}, p = {wanted.p:g}"
-        error = f"{item.tolerance:.0e}"
-        expected, computed = (
-            "none" if each is None else digits(each, item.tolerance / 100, 12) if is_short else f"{each:.12g}"
-            for each in (wanted.value, value)
-        )
-        if is_short:
-            row = [quantity, *map(written, item.varied.values()), expected, error, computed]
-        else:
-            where = "".join(f"\n{key} = {written(each)}" for key, each in item.varied.items())
-            row = [f"{quantity}{where}\n{wanted.source}", f"{expected}\n± {error}", computed]
+        about = [quantity, *(f"{key} = {written(each)}" for key, each in item.varied.items())]
+        if not is_short:
+            about.append(wanted.source)
             grid.ends.add(len(grid.rows))
+        expected, computed = (
+            "none" if each is None else digits(each, error / 100, 12) for each in (wanted.value, value)
+        )
         difference = "" if value is None else f"{value - wanted.value:.1e}"
-        grid.rows.append([*row, difference, "ok" if item.met else "differs"])
+        named = (", " if is_short else "\n").join(about)
+        grid.rows.append([named, expected, f"{error:.0e}", computed, difference, "ok" if item.met else "differs"])
     return grid

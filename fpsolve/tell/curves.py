@@ -76,11 +76,9 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
     """
     status = table[STATUS.name].values
     known, told = ~np.isnan(status), told_indices(case)
-    indices = {each.symbol: table[each.name].values for each in told}
-    numbers = {each.symbol: indices[each.symbol] for each in told if each in MAIN}
+    numbers = {each.symbol: table[each.name].values for each in told}
     for p in _told_moments(case):
         numbers[moment_at(p).symbol] = table[MOMENT.name].values[:, np.flatnonzero(case.p == p)[0]]
-    numbers |= indices
     extreme = {symbol: numbers[symbol][known] for symbol in [*numbers][:EXTREMES]}
     failed = [place for place, result in enumerate(results) if result.status.fails]
     has_status = any(status[known])

@@ -1,16 +1,19 @@
 """What `fpsolve explore` answers: numbers, sentences and curves of a case with other values of its parameters.
 
-A question of a page that is newer than another one of its kind ends that before its next factorisation: the last
-position of a slider wins, and nobody waits for what is not wanted any more. So does a page that is closed.
+Beside a curve that is the map of stability, T and densities, and simulated paths. A question of a page that is newer
+than another one of its kind ends that before its next factorisation: the last position of a slider wins, and nobody
+waits for what is not wanted any more. So does a page that is closed.
 """
 
 from __future__ import annotations
 
+import math
 import re
 import threading
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from functools import partial
 from html import unescape
 from itertools import chain
 from pathlib import Path
@@ -19,33 +22,43 @@ from time import perf_counter
 import numpy as np
 from pydantic import ValidationError
 
-from fpsolve.analysis.axis import bounds_of
-from fpsolve.budget import Meter, watched
+from fpsolve.analysis.axis import bounds_of, check_axes
+from fpsolve.analysis.density import stationary_density, tilted_density
+from fpsolve.analysis.scan import Scan, scan_row
+from fpsolve.arrays import FloatArray
+from fpsolve.budget import Meter, charge, watched
 from fpsolve.case.case import CHEAP, CHEAP_OF_WALLS, Case, load_case
-from fpsolve.case.explain import UNBOUNDED
+from fpsolve.case.explain import explain, is_number
 from fpsolve.case.refusals import obstacle
 from fpsolve.case.rewrite import rewritten
-from fpsolve.case.sections import FigureSection, Moments, OutputSection
+from fpsolve.case.sections import ChartSection, FigureSection, Moments, OutputSection
 from fpsolve.case.uncertain import Uncertain
 from fpsolve.case.vary import Vary
+from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.kinds import choose
+from fpsolve.exponent.method import DIRECTIONS
 from fpsolve.exponent.quantities import INDICES, MOMENT
 from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
+from fpsolve.model.faults import TableError
 from fpsolve.model.plane import BELOW
 from fpsolve.model.problem import Problem, checked_problem
+from fpsolve.model.quantity import GROWTH
+from fpsolve.results.nodes import Nodes
+from fpsolve.solve.chart import Chart, begun_lines, solve_chart
 from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import Job, Numerics, fault
 from fpsolve.solve.sets import everything, result_of, solve_curve
 from fpsolve.tell import solved as results
-from fpsolve.tell.blocks import Sentence
+from fpsolve.tell.blocks import Column, Drawing, Grid, Sentence
+from fpsolve.tell.chart import NAMED, show
 from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
 from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
 from fpsolve.tell.progress import waiting
-from fpsolve.tell.reports import COMPLETE, page_of, part_of_page
-from fpsolve.tell.views import field_of, listed, map_of, paths_of, refusal
+from fpsolve.tell.reports import page_of, part_of_page
+from fpsolve.tell.text import sampled
 
 MOVING_RTOL = 1e-6
 """Relative error of Λ(p) while a slider moves, at least; a larger one takes a second solve of each p to be sure."""
@@ -61,12 +74,16 @@ FACTOR = 10.0
 """From a positive value to the ends of its slider, where nothing says how far it may go."""
 BEYOND = 3.0
 """The same of a value of any sign."""
-MOST_EQUATIONS = 6
-"""Lines of the equations of motion that the page shows; more would fill it."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
 NUMBERS = {MOMENT.name, *INDICES, "classes", "discretisation"}
 """The parts that are solved."""
+PIXELS = 144, 72
+"""Of a picture, each way."""
+STEP = 16
+"""So many pixels apart, either way, are the numbers of its table."""
+PATHS, POINTS = 10, 400
+"""Paths, and points of each; the motion is shown for as many steps."""
 
 
 class Explorer:
@@ -82,8 +99,7 @@ class Explorer:
         method, kinds = choose(first), CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
         self.moves, has_square = method.is_quick, method.reason(2.0) is None
         more = USUAL_P if case.p.size < FEW and self.moves else FEWEST_P
-        more = more[more >= method.interval[0]] if method.has_pairs else more[1:]
-        p = np.union1d(case.p, more) if has_square and not {*more} <= {*case.p} else case.p
+        p = np.union1d(case.p, [each for each in more if method.reason(each) is None])
         quantities = kinds if method.has_pairs else kinds[:1]
         self.source, self.code, self.first, self.quantities = case, code, first, quantities
         self._written = quantities[: 2 + has_square]
@@ -92,7 +108,7 @@ class Explorer:
             "moments": case.moments.model_copy(update={"p": tuple(p.tolist())}),
             "output": OutputSection(quantities=quantities), "system": first.system, "noise": first.noise,
         }  # fmt: skip
-        self.case, p = case.model_copy(update=changed), np.unique(p)
+        self.case = case.model_copy(update=changed)
         chosen = np.isin(p, (p[0], 0.0, 2.0, p[-1])) | (np.arange(p.size) % (1 + p.size // MOVING_P) == 0)
         self._few, self._drawing = p[chosen].tolist(), threading.Lock()
         self._newest, self._stopped = dict[tuple[str, str], float](), dict[str, float]()
@@ -187,11 +203,10 @@ class Explorer:
         if max(abs(low), abs(high)) < NO_BOUND:
             inset = 0.01 * (high - low)
             return low + inset * (low != round(low, 12)), high - inset * (high != round(high, 12)), False
-        if value == 0:
-            return (0.0 if low >= 0 else -1.0), 1.0, False
         if value > 0 and low >= 0:
             return value / FACTOR, min(FACTOR * value, high), True
-        return max(low, -BEYOND * abs(value)), min(BEYOND * abs(value), high), False
+        size = BEYOND * abs(value) or 1.0
+        return max(low, -size), min(size, high), False
 
     def _at(self, question: Question) -> Case:
         """The case with the values of a question. Raises `FpsolveError` where there is none."""
@@ -201,11 +216,9 @@ class Explorer:
             raise FpsolveError(f"got {values!r}; must be values by their keys, which are {', '.join(sorted(known))}")
         try:
             problem = self.first.at(values)
-        except ValidationError as failure:
-            ranges = {key.rpartition(".")[2]: each.field or UNBOUNDED for key, each in self.first.parameters.items()}
-            raise refusal(failure, ranges) from failure
         except (TypeError, ValueError) as failure:
-            raise FpsolveError(str(failure)) from failure
+            text = re.sub(r"^\w+: (?=\w+: )", "", str(failure), flags=re.MULTILINE)  # without names of classes
+            raise FpsolveError(text) from failure
         if sentence := obstacle(self.first, values, self.case.p):
             raise FpsolveError(sentence)
         return self.case.model_copy(update={"system": problem.system, "noise": problem.noise})
@@ -236,14 +249,13 @@ class Explorer:
     def _told(self, case: Case, result: CurveResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
-        equations = equations_of(case.system)
         columns = moments.p, moments.value, moments.derivative, moments.error_estimate
         index, exponent = result.stability_index, result.lyapunov_exponent
         return {
             "curve": [listed(each[order]) for each in columns],
             "root": index.value if index else None,
             "exponent": exponent.value if exponent else None,
-            "equations": equations if len(equations) <= MOST_EQUATIONS else [],
+            "equations": equations_of(case.system),
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
             "numbers": part_of_page([*indices(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
@@ -286,7 +298,6 @@ class Explorer:
                 case,
                 chain(results.show(case, [found], Path()), notes(case, [found], "")),
                 started,
-                state=COMPLETE,
                 file=f"{self.source.name}-explored.toml",
                 more="`fpsolve run` of the case below writes all numbers.",
                 case_text=self._text(case) if self.source.text else "",
@@ -316,6 +327,151 @@ def _letters(latex: str) -> str:
     text = unescape(re.sub(r"\\(?:var)?([A-Za-z]+)", r"&\1;", latex.strip("$")))
     text = re.sub(r"_(\d)", lambda digit: digit[1].translate(BELOW), text)
     return "" if re.search(r"[&_^{}]", text) else text
+
+
+def map_of(case: Case, axes: object, tell: Callable[[Answer], None]) -> Answer:
+    """The lines λ = 0 and Λ(2) = 0 over two parameters, as `chart` traces them, and the regions between them.
+
+    Args:
+        axes: two tables such as those of [chart].
+        tell: takes what there is so far, of the grid that is searched for a line its rows.
+    """
+    lines = ["lyapunov_exponent = 0"] * case.method.has_pairs + ["moment(2) = 0"] * (case.method.reason(2.0) is None)
+    x, y = axes if isinstance(axes, list) and len(axes) == 2 else (None, None)
+    try:
+        frame = ChartSection.model_validate({"x": x, "y": y, "lines": lines})
+        check_axes(case.problem, frame.x, frame.y)
+    except ValidationError as failure:
+        texts = [f"{key}: {text}" for _, key, text in explain(failure.errors(), ChartSection.model_fields)]
+        raise FpsolveError("\n".join(texts)) from failure
+    except TableError as failure:
+        raise FpsolveError(str(failure)) from failure
+    sides = frame.x, frame.y
+    case, grid = case.model_copy(update={"chart": frame}), list[list[float | None]]()
+
+    def answer(chart: Chart) -> Answer:
+        return {
+            "axes": [asdict(side) for side in sides],
+            "grid": [*grid],
+            "lines": [
+                {"name": line.target.equation, "branches": [[*map(listed, each.path)] for each in line.branches]}
+                for line in chart.lines
+            ],
+            "regions": [
+                {"name": each.name, "at": [float(side.value(u)) for side, u in zip(sides, each.at, strict=True)]}
+                for each in (chart.regions.each if chart.regions else ())
+                if each.share >= NAMED
+            ],
+            "told": part_of_page(each for each in show(case, chart) if not isinstance(each, Drawing)),
+        }
+
+    def scans() -> Iterator[Scan]:
+        for row in chain.from_iterable(line.rows() for line in begun):
+            grid[:] = grid if row.number else [[None] * row.count] * row.count
+            found = scan_row(row)
+            grid[row.number] = listed(np.sign(found.values))
+            tell(answer(chart))
+            yield found
+
+    chart, begun = Chart((), ()), begun_lines(case)
+    for chart in solve_chart(begun, scans()):
+        tell(answer(chart))
+    grid.clear()
+    return answer(chart)
+
+
+def field_of(case: Case, p: object) -> Answer:
+    """T and the stationary density over phase and noise, of three and four variables densities of directions."""
+    if not is_number(p):
+        raise FpsolveError(f"got p = {p!r}; must be a finite number; write, for example, 2")
+    if why := case.method.no_picture:
+        raise FpsolveError(why)
+    solver = Numerics.of(case).solver(case.problem)
+    stationary = solver.pair(0.0)
+    density, pair = stationary_density(stationary), solver.pair(float(str(p)))  # which refuses one that misleads
+    grid = density.grid
+    about = Quantity("", "", "density", unit=grid.unit), case.problem.noise_quantity
+    unit, noise_unit = (f" ({unit})" if (unit := each.timed(case.units.time).unit_in_words) else "" for each in about)
+    if case.method.pictures == DIRECTIONS:
+        found = [density, *([tilted_density(pair)] if pair.p else [])]
+        names = [f"{each.words} ({each.unit})" for each in grid.quantities]
+        panels = [panel(each.name + unit, grid.first, grid.second, each.values, names) for each in found]
+        said = [Sentence(repr(each)) for each in found]
+    else:
+        nodes, names = Nodes.of(pair).seen(pair), ["phase φ (rad)", f"noise ξ{noise_unit}"]
+        draw = partial(panel, x=nodes.phi.ravel(), y=nodes.y, names=names, is_chain=nodes.is_lines)
+        panels = [
+            draw(f"eigenfunction T of p = {pair.p:g}", values=nodes.fields(pair).T),
+            draw(f"stationary density{unit}", values=nodes.fields(stationary).T_adjoint),
+        ]
+        said = []
+    pictures, tables = zip(*panels, strict=True)
+    return {"panels": pictures, "told": part_of_page([*tables, *said])}
+
+
+def listed(values: FloatArray) -> list[float | None]:
+    """Numbers for JSON, which has no NaN."""
+    return [each if math.isfinite(each) else None for each in values.tolist()]
+
+
+def panel(
+    title: str, x: FloatArray, y: FloatArray, values: FloatArray, names: Sequence[str], is_chain: bool = False
+) -> tuple[Answer, Grid]:
+    """A picture of values at nodes, on pixels between them, x first, of the states of a chain strips; and its table."""
+    u, v = (np.linspace(each[0], each[-1], count) for each, count in zip((x, y), PIXELS, strict=True))
+    rows = np.array([np.interp(u, x, column) for column in values.T])
+    near = np.abs(v[:, None] - y).argmin(axis=1)
+    pixels = np.array([column[near] if is_chain else np.interp(v, y, column) for column in rows.T])
+    ends = [[u[0], u[-1]], [v[0], v[-1]]]
+    picture: Answer = {"title": title, "ends": ends, "names": names, "values": [*map(listed, pixels)]}
+    columns = [Column(" \\ ".join(names)), *(Column(f"{each:.3g}") for each in v[::STEP])]
+    cells = np.column_stack([u, pixels[:, ::STEP]])[::STEP]
+    return picture, Grid(title, columns, [[f"{each:.4g}" for each in row] for row in cells])
+
+
+def paths_of(case: Case) -> Answer:
+    """ln‖x(t)‖ of ten simulated paths, and the motion of one of them, whose wall throws it back."""
+    from fpsolve.simulation.batches import standard_error
+    from fpsolve.simulation.coefficients import coefficients, starting_state  # which takes 110 ms
+    from fpsolve.simulation.kernels import RENORMALISED, advance
+    from fpsolve.simulation.setup import obstacles, simulated_parts
+
+    system, noise = simulated_parts(case.problem)
+    if told := obstacles(system, noise):
+        raise FpsolveError("; ".join(told.values()))
+    known, rng = coefficients(system, noise), np.random.default_rng(case.monte_carlo.seed)
+    h = known.default_step
+    motion, (y, xi) = known.motion(h), starting_state(noise, PATHS, rng, known.size(h))
+
+    def followed(count: int) -> tuple[FloatArray, FloatArray]:
+        """After every so many steps ln‖x‖ of all paths, and the first variable of the first one."""
+        log_norm, push = np.zeros((2, PATHS))
+        logs, first = np.zeros((POINTS + 1, PATHS)), np.zeros(POINTS + 1)
+        for k in range(POINTS + 1):
+            logs[k], first[k] = log_norm, y[0, 0]
+            charge(PATHS)
+            advance(motion, h, y, xi, log_norm, push, np.zeros(2), count, RENORMALISED, rng)
+        return logs, first * np.exp(logs[:, 0])
+
+    short = h * np.arange(POINTS + 1)
+    long = short * max(1, round(64 * known.transient() / h / POINTS))
+    with Meter(math.inf).running():
+        logs, _ = followed(round(long[1] / h))
+        _, first = followed(1)
+    if not (np.isfinite(logs).all() and np.isfinite(first).all()):
+        raise FpsolveError("the paths leave the range of numbers; take a weaker noise")
+    has_wall = any(abs(math.cos(jump.phase)) < 1e-12 for jump in system.jumps)  # at x = 0
+    rates = logs[-1] / long[-1]
+    mean, error = float(rates.mean()), standard_error(rates)
+    rows: list[Sequence[str]] = [[f"{k}", f"{rate:.4g}"] for k, rate in enumerate(rates, 1)]
+    unit = GROWTH.timed(case.units.time).unit
+    grid = Grid("", [Column("path"), Column(f"ln‖x‖/t ({unit})")], rows)
+    said = Sentence(f"Their mean growth rate ({unit}) is {sampled(mean, error)} ± {error:.1e}, a standard error.")
+    return {
+        "time": long.tolist(), "logs": logs.T.tolist(), "short": short.tolist(),
+        "motion": (np.abs(first) if has_wall else first).tolist(),
+        "name": case.problem.linear.states[0].removesuffix("₁"), "told": part_of_page([said, grid]),
+    }  # fmt: skip
 
 
 class Explored:

@@ -145,8 +145,7 @@ def _draw_curves(
     over = P if setting.x == "p" else case.about(setting.x)
     colours = draw_series(axes, case, series, over, setting.quantity, _dots(case, simulated))
     places = np.concatenate([item.x for item in series])
-    is_short = setting.x == "p" and places.size and places.max() < 10 * places.min()
-    scale_axis(axes.xaxis, "linear" if is_short else scale_of(places), setting.xlim)
+    scale_axis(axes.xaxis, scale_of(places), setting.xlim)
     scale_axis(axes.yaxis, "linear", setting.ylim)
     _mark(axes, series, colours)
 
@@ -171,7 +170,7 @@ def _with_theory(case: Case, count: int) -> set[int]:
 
 def _moment_series(case: Case, result: CurveResult, *, with_theory: bool) -> Series:
     p = result.moments.p
-    first, last = (float(p.min()), float(p.max())) if p.size else (math.nan, math.nan)
+    first, last = float(p.min(initial=math.inf)), float(p.max(initial=-math.inf))
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
     root, slope = (
         found.value if each.name in case.figure.mark and (found := result.estimates[each.name]) else None
@@ -182,7 +181,7 @@ def _moment_series(case: Case, result: CurveResult, *, with_theory: bool) -> Ser
         p,
         result.moments.value,
         line,
-        perturbed_moments(result.curve.problem, line) if line.size else line,
+        perturbed_moments(result.curve.problem, line),
         root if root is not None and first <= root <= last else None,
         slope if first <= 0 <= last else None,
     )

@@ -6,24 +6,18 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from scipy.special import chdtri
 
 from fpsolve.analysis.spreads import LEVEL
-from fpsolve.arrays import FloatArray
-from fpsolve.data import Quantity
 from fpsolve.drawing import figure_for, label_axes, plain_numbers
-from fpsolve.measured import NoiseFit
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.spectrum import SIDES, UNITS
 from fpsolve.solve.noise import Critical, NoiseOutcome, density_of
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
 from fpsolve.tell.notes import note_on
 from fpsolve.tell.text import likely, sampled
-
-F = TypeVar("F", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -43,28 +37,14 @@ class Convention:
         """G over S: 2 for one-sided values per Hz, 1/π per rad/s."""
         return 1 / SIDES[self.sided] / (2 * math.pi if self.per == "rad/s" else 1.0)
 
-    def frequency(self, omega: F) -> F:
-        """ω in the unit of frequencies."""
-        return omega / UNITS[self.per]
+    @property
+    def unit(self) -> float:
+        """Of frequencies, in rad/s."""
+        return UNITS[self.per]
 
     @property
     def symbol(self) -> str:
         return "f" if self.per == "Hz" else "ω"
-
-    def unit(self, noise_in: str) -> str:
-        """Of densities."""
-        per = {"Hz": "Hz", "rad/s": "(rad/s)"}[self.per]
-        return f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
-
-
-def band_of(fit: NoiseFit) -> tuple[FloatArray, FloatArray] | None:
-    """Ends of the interval that holds S with `LEVEL` by each measured value, of the law of a mean of periodograms."""
-    spectrum = fit.spectrum
-    if spectrum.relative_error is None:
-        return None
-    freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)
-    low, high = (spectrum.density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
-    return low, high
 
 
 def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: Path) -> None:
@@ -72,21 +52,23 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
     fit, noise_in = outcome.fit, outcome.wanted.noise_in
     spectrum, words = fit.spectrum, SIGNALS[noise_in].words
     paths = [folder / f"noise.{ending}" for ending in ("png", "pdf")]
-    factor, x = shown.factor, shown.frequency(spectrum.frequencies)
+    factor, x = shown.factor, spectrum.frequencies / shown.unit
     fine = np.geomspace(spectrum.frequencies[0], spectrum.frequencies[-1], 400)
-    many, kind = len(fit.parts), fit.parts[0].kind
-    fitted = f"{kind} noise" if many == 1 else f"{many} {kind} noises"
+    many = len(fit.parts)
+    fitted = f"{fit.parts[0].kind} noise" if many == 1 else f"{many} {fit.parts[0].kind} noises"
     title = f"{source.name}: {SIGNALS[outcome.wanted.of].words}, fitted by {fitted}"
     density = factor * spectrum.density
     with figure_for(paths, title) as figure:
         axes = figure.subplots()
-        if (band := band_of(fit)) is not None:
-            axes.fill_between(x, factor * band[0], factor * band[1], color="0.75", linewidth=0, label="95 % interval")
+        if spectrum.relative_error is not None:
+            freedom, tail = 2 / spectrum.relative_error**2, 0.5 * (1 - LEVEL)  # of the law of a mean of periodograms
+            low, high = (density * freedom / chdtri(freedom, share) for share in (tail, 1 - tail))
+            axes.fill_between(x, low, high, color="0.75", linewidth=0, label=f"{LEVEL:.0%} interval")
         axes.loglog(x, density, ".", color="0.35", label="formula" if spectrum.is_formula else "measured")
         values, _ = density_of(fit, fine.tolist())
-        axes.loglog(shown.frequency(fine), factor * values, label="fitted")
+        axes.loglog(fine / shown.unit, factor * values, label="fitted")
         for each in fit.misfit:
-            place = shown.frequency(each.omega or spectrum.frequencies[0])
+            place = each.omega / shown.unit or x[0]
             axes.axvline(place, color="C1", linestyle="--")
             name = each.name.replace("ω", shown.symbol) if each.omega else "← 0"
             corner = axes.get_xaxis_transform()
@@ -95,10 +77,11 @@ def draw_noise(outcome: NoiseOutcome, source: Path, shown: Convention, folder: P
         axes.set(xlim=(0.9 * x[0], x[-1] / 0.9), ylim=(0.3 * np.nanmin(density), 3 * np.nanmax(density)))
         for axis in (axes.xaxis, axes.yaxis):
             plain_numbers(axis)
-        symbol = {"Hz": "f", "rad/s": r"\omega"}[shown.per]
-        frequency = Quantity("", "", "frequency", f"${symbol}$", shown.per)
-        about = Quantity("", "", f"{shown.sided}-sided density of {words}", f"$G({symbol})$", shown.unit(noise_in))
-        label_axes(axes, frequency.attributes, about.attributes)
+        frequency = {"long_name": "frequency", "symbol": f"${shown.symbol}$", "units": shown.per}
+        about = {"long_name": f"{shown.sided}-sided density of {words}", "symbol": f"$G({shown.symbol})$"}
+        per = "Hz" if shown.per == "Hz" else "(rad/s)"
+        unit = f"1/{per}" if noise_in == "stiffness" else f"1/s^2/{per}"
+        label_axes(axes, frequency, about | {"units": unit})
 
 
 def show(outcome: NoiseOutcome, source: Path, shown: Convention) -> Iterator[Block]:
@@ -120,7 +103,7 @@ def misfit_grid(outcome: NoiseOutcome, source: Path, shown: Convention) -> Grid:
     grid = Grid(title, [*map(Column, headings), Column("± s.e.", 1)], remark=remark)
     values, errors = density_of(fit, [each.omega for each in fit.misfit])
     for each, value, error in zip(fit.misfit, values.tolist(), errors.tolist(), strict=True):
-        name, frequency = each.name.replace("ω", shown.symbol), f"{shown.frequency(each.omega):.4g}"
+        name, frequency = each.name.replace("ω", shown.symbol), f"{each.omega / shown.unit:.4g}"
         numbers = f"{value:.4g}", f"{error:.2g}", f"{1 + each.relative:.4g}", f"{each.error:.2g}"
         grid.rows.append([name, frequency, *numbers])
     return grid
@@ -134,7 +117,10 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
         yield f"In weak noise{walls} λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
     if outcome.verdict is None:
         if outcome.failure is None:
-            yield _missing(outcome)
+            is_one = len(outcome.wanted.modes.omega) == 1
+            remedy = "an oscillator state its damping by --damping-ratio."
+            of_two = "two modes state their case by --case; `fpsolve new coupled` copies one."
+            yield f"For λ and Λ(2) of {remedy if is_one else of_two}"
         return
     is_formula = outcome.fit.spectrum.is_formula
     for symbol, each, what in (
@@ -152,13 +138,6 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     share = outcome.fit.off
     off = f", and that it is {share:.0%} off where stability depends on it (try another --kind)" if share else ""
     yield f"The probabilities count the standard errors of the fit{off}; see the page From a measurement to a case."
-
-
-def _missing(outcome: NoiseOutcome) -> str:
-    """What to do for λ and Λ(2)."""
-    if len(outcome.wanted.modes.omega) > 1:
-        return "For λ and Λ(2) of two modes state their case by --case; `fpsolve new coupled` copies one."
-    return "For λ and Λ(2) of an oscillator state its damping by --damping-ratio."
 
 
 def _percent(each: Critical) -> str:

@@ -47,9 +47,7 @@ def notes(
             curves = {curve.number: curve for _, curve in group}
             who, rest = f"{case.name}: {len(curves)} of {count} curves", ""
             if len(curves) <= NAMED:
-                *others, last = [curve.label for curve in curves.values()]
-                comma = "; " if any("," in label for label in (*others, last)) else ", "
-                named = " and ".join(filter(None, (comma.join(others), last)))
+                named = " and ".join(curve.label for curve in curves.values())
                 who = f"{case.name}, {named}" if named else case.name
             if any(message.data != worst.data for message, _ in group):
                 words = "these numbers are of" if worst.size is None else "most for"

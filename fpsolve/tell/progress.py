@@ -20,8 +20,8 @@ LINE_SECONDS, LINE_SHARE = 10.0, 0.1
 """A line in a file comes after as long at least, and as far."""
 SPEED_SECONDS = 600.0
 """Of the last steps, from whose speed the time to go is estimated."""
-ROOMY, LONGEST_WAIT = 80, 50
-"""Columns of a terminal from which on there is room for the name of the case, and more for a long bar."""
+ROOMY = 80
+"""Columns of a terminal from which on there is room for the name of the case."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Bars:
         self._display = Progress(
             text("{task.fields[case]}{task.description}" if self.console.width >= ROOMY else "{task.description}"),
             text("{task.fields[waits]}", style="dim"),
-            BarColumn(bar_width=20 if self.console.width >= ROOMY + LONGEST_WAIT else 4),
+            BarColumn(bar_width=4),
             text("{task.fields[counted]}"),
             TimeRemainingColumn(elapsed_when_finished=True),
             console=self.console,

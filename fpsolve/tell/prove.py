@@ -66,7 +66,8 @@ def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
         count = sum(found is not None and found.is_proven for _, found in proof.moments)
         yield Column("proven"), f"{count} of {len(proof.moments)}"
         path = proof.exponent
-        yield Column(LYAPUNOV_EXPONENT.symbol, 1), _between(path) if path else ""
+        bounds = f"in [{', '.join(bounds_text(path))}]" if path and path.is_proven else NOT_PROVEN
+        yield Column(LYAPUNOV_EXPONENT.symbol, 1), bounds if path else ""
         yield Column("paths", 2), FATES[path.sign] if path else ""
         if len(proof.moments) > PROOFS:
             yield Column("moments", 3), _counted(proof)
@@ -88,11 +89,6 @@ def _counted(proof: CurveProof) -> str:
     counts = {word: signs.count(sign) for sign, word in FATES.items() if sign}
     told = [f"{n} {word if n == 1 else word.removesuffix('s')}" for word, n in counts.items() if n]
     return ", ".join(told) or "none is known"
-
-
-def _between(found: Enclosure | IndexEnclosure) -> str:
-    """ "in [0.0010257274, 0.0010257275]"."""
-    return f"in [{', '.join(bounds_text(found))}]" if found.is_proven else NOT_PROVEN
 
 
 def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:

@@ -27,8 +27,6 @@ from fpsolve.tell.notes import note_on
 from fpsolve.tell.progress import Phase, Watch
 from fpsolve.tell.text import EACH
 
-COMPLETE = "Complete."
-"""The state of a run that did all."""
 INCOMPLETE = "Not complete: the run ended early, and this is what was done."
 """The state of a run that ended early."""
 
@@ -60,9 +58,8 @@ def write_report(
         return
     with watch.bar(Phase(case.name, "report")), writable(folder):
         try:
-            state = COMPLETE if complete else INCOMPLETE
             more = f"All numbers are in {', '.join(files)}, in the folder of the results, {folder.name}."
-            text = page_of(case, blocks, started, state=state, file=case.path.name, more=more)
+            text = page_of(case, blocks, started, complete=complete, file=case.path.name, more=more)
         except OSError:
             raise
         except Exception as failure:  # what is finished is there already, and shall not be lost for its picture
@@ -85,23 +82,30 @@ def shown_at_the_end(show: Callable[[], None]) -> Iterator[None]:
 
 
 def page_of(
-    case: Case, blocks: Iterable[Block], started: datetime, *, state: str, file: str, more: str, **facts: object
+    case: Case,
+    blocks: Iterable[Block],
+    started: datetime,
+    *,
+    file: str,
+    more: str,
+    complete: bool = True,
+    **facts: object,
 ) -> str:
     """The page of a case.
 
     Args:
         blocks: what stands on it; notes come last, and of each only one.
         started: when the command was.
-        state: whether all was done.
         file: the name of the case.
         more: where the numbers are.
+        complete: whether all was done.
         facts: other than those of the case.
     """
     return _filled(
         "report.html",
         blocks,
         title=case.headline,
-        state=state,
+        state="Complete." if complete else INCOMPLETE,
         equations=equations_of(next(case.curves(0, 1)).problem.system),
         about=[*_pieces(about(case))],
         facts={**facts_of(case, started), **facts},
@@ -142,11 +146,10 @@ def _picture(drawing: Drawing) -> Mapping[str, str]:
     """The address that is a picture itself, or why there is none; empty where there is nothing to draw."""
     try:
         with tempfile.TemporaryDirectory() as place:
-            drawing.draw([path := Path(place, f"picture.{drawing.kind}")], "")
+            drawing.draw([path := Path(place, "picture.svg")], "")
             if not path.exists():
                 return {}
-            kind = "svg+xml" if drawing.kind == "svg" else drawing.kind
-            return {"source": f"data:image/{kind};base64,{b64encode(path.read_bytes()).decode()}"}
+            return {"source": f"data:image/svg+xml;base64,{b64encode(path.read_bytes()).decode()}"}
     except Exception as failure:  # the numbers shall not be lost for a picture
         reason = str(failure) if isinstance(failure, FpsolveError) else f"{type(failure).__name__}: {failure}"
         return {"source": "", "missing": str(Message(Code.NO_PICTURE, reason=reason))}

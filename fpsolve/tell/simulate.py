@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from fpsolve.case.case import Case
-from fpsolve.data import Quantity
 from fpsolve.drawing import Format, figure_for, label_axes, label_of
 from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
 from fpsolve.model.quantity import OF_STOPS
@@ -39,14 +38,16 @@ def _draw_response(simulated: SimulatedCurve, time_unit: str, paths: Sequence[Pa
         return
     with figure_for(paths, heading, simulated.curve.held(time_unit), Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
-        of, timed = simulated.response.about, partial(Quantity.timed, unit=time_unit)
+        of = simulated.response.about
+        quantities = of.first, of.second, of.amplitude, of.amplitude_density, of.density
+        x, v, amplitude, of_amplitude, of_both = (each.timed(time_unit).attributes for each in quantities)
         simulated.response.plot(plane)
         simulated.response.plot_amplitude(radial)
         if inside := radial.get_legend():
             inside.remove()  # as it stands below
-        label_axes(plane, timed(of.first).attributes, timed(of.second).attributes)
-        label_axes(radial, timed(of.amplitude).attributes, timed(of.amplitude_density).attributes)
-        figure.axes[-1].set_ylabel(label_of(timed(of.density).attributes, 36))  # of the colour bar
+        label_axes(plane, x, v)
+        label_axes(radial, amplitude, of_amplitude)
+        figure.axes[-1].set_ylabel(label_of(of_both, 36))  # of the colour bar
 
 
 def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:

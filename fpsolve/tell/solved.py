@@ -43,18 +43,14 @@ def show(
     for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
         if not result.curve.is_possible:
             continue
-        told = [*told_of(case, result)] if is_each else []
+        parts = indices(case, result), excursions(case, result), response(case, result), meaning(result)
+        told = [*chain(*parts)] if is_each else []
         if is_each and _has_grid(case, result, is_whole=is_whole):
             told.append(moment_grid(case, result))
         if told:
             yield from (Sentence("", result.curve.label), *told)
         if place < PICTURES:
             yield from figures_of(case, result, folder, samples.get(result.curve.number))
-
-
-def told_of(case: Case, result: CurveResult) -> Iterator[Block]:
-    """What is told of one curve, but for its verdict and Λ(p)."""
-    yield from chain(indices(case, result), excursions(case, result), response(case, result), meaning(result))
 
 
 def _has_grid(case: Case, result: CurveResult, *, is_whole: bool) -> bool:
@@ -66,8 +62,7 @@ def _has_grid(case: Case, result: CurveResult, *, is_whole: bool) -> bool:
 
 def figures_of(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """The figures of a curve, beside its simulation."""
-    for draw in FIGURES.values():
-        yield from draw(case, result, folder, simulated)
+    return chain.from_iterable(draw(case, result, folder, simulated) for draw in FIGURES)
 
 
 def write_figures(

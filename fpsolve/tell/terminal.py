@@ -72,11 +72,9 @@ class Screen:
         chosen = self._layout(columns, rows)
         if chosen is None:
             for row in rows:
-                told = [
-                    (column.heading, cell.plain.replace("\n", " ")) for column, cell in zip(columns, row, strict=True)
-                ]
-                lines = [f"{heading} = {text}" if heading else text for heading, text in told if text]
-                self.say("\n  ".join(lines))
+                told = zip(columns, row, strict=True)
+                lines = (f"{column.heading} = {cell}".removeprefix(" = ") for column, cell in told if cell)
+                self.say("\n  ".join(line.replace("\n", " ") for line in lines))
         else:
             kept, is_folded = chosen
             table = Table()
