@@ -13,8 +13,6 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from fpsolve.model.faults import MISSING, TableError, entry_of, fields_of, guess, nearest, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
-MOST_FAULTS = 1000
-"""Of so many faults of a case at most each is told."""
 _OWN = "own sentence"
 LIST, TABLE, WORD, NUMBER = "<list>", "<table>", "<word>", "<number>"
 """Tags of what TOML has there, in a union that is told apart by that; parts of pydantic's places that are no keys."""
@@ -57,7 +55,7 @@ def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
     try:
         return validated(fields, table)
     except ValidationError as error:
-        refuse(told(error.errors()[: MOST_FAULTS + 1], fields))
+        refuse(told(error.errors(), fields))
         raise
 
 

@@ -32,8 +32,6 @@ REDUCED = "ou-reduction"
 """The kind of a noise (7) whose treatment is this."""
 EQUATIONS, STATING = "equations", ("variables", "drift")
 """The kind of a [system] that names none, but states one of these."""
-REMOVED = {"plane": 'write the matrices as equations, for example variables = ["x", "v"], drift = ["v", "-x - xi*x"]'}
-"""Kinds that are no more, and what to write instead."""
 
 
 def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
@@ -119,8 +117,7 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     names = [*(SYSTEMS if half == "system" else NOISES)]
     if name is not None and name not in names:
         text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
-        remedy = REMOVED.get(str(name), f'write, for example, kind = "{names[0]}"')
-        refuse([(("kind",), name, f"{text} {remedy}")])
+        refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 

@@ -19,7 +19,7 @@ from fpsolve.case.kinds import parameters_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, VarySection, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.files import Unreadable, Words, read_text
-from fpsolve.model.faults import TableError, choices, entry_of, shown, shown_with_kind
+from fpsolve.model.faults import choices, entry_of, shown, shown_with_kind
 from fpsolve.model.parameters import example_of, meaning_of
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
@@ -70,11 +70,7 @@ def column_of(field: FieldInfo, key: str = "") -> FieldInfo:
 
     def listed(sweep: Sweep) -> Column:
         checked(dict.fromkeys(("start", "stop"), entry_of(found)), {"start": sweep.start, "stop": sweep.stop})
-        values = tuple(sweep.values.tolist())
-        if repeats((each,) for each in values):
-            text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further "
-            raise TableError(f"{text}apart", "num")
-        return values
+        return tuple(sweep.values.tolist())
 
     between = Annotated[Sweep, AfterValidator(listed)]
     annotation: Any = some if texts else Annotated[Annotated[some, Tag(LIST)] | Annotated[between, Tag(TABLE)], BY_KIND]
@@ -86,7 +82,7 @@ def column_of(field: FieldInfo, key: str = "") -> FieldInfo:
 def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
-        for i, _ in repeats((each,) for each in values):
+        for i, _ in repeats((each,) for each in values)[:1]:
             yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
 
 

@@ -477,13 +477,6 @@ class ChartSection(Section):
         ),
     ] = None
 
-    @model_validator(mode="after")
-    def _two_parameters(self) -> Self:
-        if self.x.key == self.y.key:
-            text = f'got "{self.y.key}" for both axes; must be two parameters; choose another for one of them'
-            refuse([(("y", "key"), self.y.key, text)])
-        return self
-
 
 class ExcursionSection(Section):
     """[excursions]: how far ‖x‖ may rise above its start, and what that start is."""
