@@ -18,7 +18,7 @@ from pydantic_core import ErrorDetails
 
 from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
 from fpsolve.case.matrices import with_matrices
-from fpsolve.model.faults import TableError, fields_of, nearest, shown_with_kind, table_of
+from fpsolve.model.faults import TableError, fields_of, nearest, shown, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
@@ -116,7 +116,7 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
         name = REDUCED
     names = [*(SYSTEMS if half == "system" else NOISES)]
     if name is not None and name not in names:
-        text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
+        text = f"got {shown(name)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
     kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))

@@ -19,7 +19,7 @@ from fpsolve.case.kinds import parameters_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, VarySection, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.files import Unreadable, Words, read_text
-from fpsolve.model.faults import choices, entry_of, shown, shown_with_kind
+from fpsolve.model.faults import choices, entry_of, shown
 from fpsolve.model.parameters import example_of, meaning_of
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
@@ -33,7 +33,7 @@ def vary_of(value: object, info: ValidationInfo) -> Vary:
     if isinstance(value, Vary):
         return value
     if not isinstance(value, dict):
-        text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
+        text = f"got {shown(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         raise ValueError(text)
     if (parameters := parameters_of(info.data, context)) is None:
         refuse([((), value, DEPENDENT)])

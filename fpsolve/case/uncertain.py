@@ -14,7 +14,7 @@ from fpsolve.case.explain import DEPENDENT, checked, refuse
 from fpsolve.case.kinds import problem_of
 from fpsolve.case.sections import UNCERTAIN, Deviation, StandardDeviation, flat
 from fpsolve.case.vary import Vary
-from fpsolve.model.faults import shown, shown_with_kind
+from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 
 _FIELD = FieldInfo.from_annotated_attribute(cast("type[object]", Deviation), None)
@@ -46,7 +46,7 @@ def uncertain_of(value: object, info: ValidationInfo) -> Uncertain:
     if isinstance(value, Uncertain):
         return value
     if not isinstance(value, dict):
-        raise ValueError(f"got {shown_with_kind(value)}; must be a table; write, for example, {UNCERTAIN}")
+        raise ValueError(f"got {shown(value)}; must be a table; write, for example, {UNCERTAIN}")
     if (problem := problem_of(info.data)) is None:
         refuse([((), value, DEPENDENT)])
         return Uncertain()
