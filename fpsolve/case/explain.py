@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, TypeGuard, get_args
+from typing import Any, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, ValidationError, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from fpsolve.model.faults import MISSING, TableError, entry_of, fields_of, guess, nearest, sentence, written_path
+from fpsolve.model.faults import TableError, fields_of, guess, nearest, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
 _OWN = "own sentence"
@@ -89,7 +89,7 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
         if detail["type"] in _UNKNOWN and (known := guess(str(path[-1]), _known_keys(path, fields))):
             misspelt.add((*path[:-1], *known.split(".")))
     for path, detail in faults:
-        is_missing = detail["type"] == "missing" or detail["msg"].startswith(MISSING)
+        is_missing = detail["type"] == "missing" or detail["msg"].startswith("missing")
         if not (is_missing and path in misspelt) and detail["msg"] != DEPENDENT:
             yield path, written_path(path), _sentence(path, detail, fields)
 
@@ -114,6 +114,18 @@ def _sentence(path: Path, detail: ErrorDetails, fields: Fields) -> str:
     if type(path[-1]) is int:
         field = entry_of(field)
     return sentence(detail, field)
+
+
+def entry_of(field: FieldInfo) -> FieldInfo:
+    """The field of an entry of a list, with the words of the list; of what is none the field itself."""
+    inner: list[Any] = [field.annotation]
+    for kind in inner:
+        if get_origin(kind) is tuple:
+            entry = FieldInfo.from_annotation(get_args(kind)[0])
+            entry.description, entry.examples = field.description, field.examples
+            return entry
+        inner += get_args(kind)
+    return field
 
 
 def _beside(path: Path, fields: Fields) -> tuple[Fields, FieldInfo]:

@@ -14,12 +14,12 @@ from pydantic import AfterValidator, Field, Tag, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shortened
-from fpsolve.case.explain import BY_KIND, DEPENDENT, LIST, TABLE, Fields, Refusal, checked, refuse
+from fpsolve.case.explain import BY_KIND, DEPENDENT, LIST, TABLE, Fields, Refusal, checked, entry_of, refuse
 from fpsolve.case.kinds import parameters_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, VarySection, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.files import Unreadable, Words, read_text
-from fpsolve.model.faults import choices, entry_of, shown
+from fpsolve.model.faults import choices, shown
 from fpsolve.model.parameters import example_of, meaning_of
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
