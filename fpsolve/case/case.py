@@ -455,7 +455,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
         text = "its name must have no control characters, and be more than dots; rename the file"
         faults.append(Fault("", None, text))
     kinds = kinds_of(data)
-    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds}
+    context = {"folder": Path(path).parent, "varies": bool(data.get("vary"))}
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it

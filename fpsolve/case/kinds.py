@@ -20,7 +20,6 @@ from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
 from fpsolve.case.matrices import with_matrices
 from fpsolve.model.faults import TableError, fields_of, nearest, shown, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
-from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.problem import Problem
@@ -67,21 +66,12 @@ def names_of(table: Any) -> list[str]:
 
 
 def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
-    """Noises that the system does not name; those that it names, if they are missing."""
-    wanted = [section.partition(".")[2] for section in sections]
-    told = f"the noise of the system, which is {sections[0]}"
-    if len(sections) > 1:
-        told = f"one of the noises of the system, which are {', '.join(sections)}"
-    for name in names:
-        if name not in wanted:
-            text = f"is not {told};{nearest(name, wanted)}"
-            yield (name,), name, f"{text} rename or remove it, or name it in noises of [system]"
-    if wanted != [""] and not names:
+    """Noises that are not those of the system, of which one has the section "noise" and no name."""
+    if {*names} != {section.partition(".")[2] for section in sections} - {""}:
         stated = " and ".join(f"[{section}]" for section in sections)
-        yield (), None, f"is not {told}; write {stated}, or name this in noises"
-    missing = [section for section, name in zip(sections, wanted, strict=True) if name not in names]
-    if missing and names and set(names) <= set(wanted):
-        yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
+        found = " and ".join(f"[noise.{name}]" for name in names) or "[noise] alone"
+        text = f"must be {stated} for this system, but is {found}; rename it, or name others in noises of [system]"
+        yield (), None, text
 
 
 def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
@@ -137,26 +127,10 @@ def system_of(data: Mapping[str, object]) -> str:
     return "system" if "system" in data else "oscillator"
 
 
-def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[str, FieldInfo] | None:
-    """The parameters of a case by their keys, each with its range; None where not all are known.
-
-    Args:
-        valid: the sections that are.
-        context: with the kinds that the tables name.
-    """
-    if problem := problem_of(valid):
-        known = problem.parameters.items()
-        return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
-    kinds: Mapping[str, type[Parametrised]] = context.get("kinds", {})
-    if len({issubclass(kind, Noise) for kind in kinds.values()}) < 2 or not all(
-        kind.fields() for kind in kinds.values()
-    ):
-        return None
-    return {
-        f"{section if issubclass(kind, Noise) else kind.section}.{name}": fields_of(kind)[name]
-        for section, kind in kinds.items()
-        for name in (*kind.fields(), *kind.words)
-    }
+def parameters_of(problem: Problem) -> dict[str, FieldInfo]:
+    """The parameters of a problem by their keys, each with its range."""
+    known = problem.parameters.items()
+    return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
 
 
 def problem_of(valid: Mapping[str, Any]) -> Problem | None:

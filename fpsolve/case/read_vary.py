@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shortened
 from fpsolve.case.explain import BY_KIND, DEPENDENT, LIST, TABLE, Fields, Refusal, checked, entry_of, refuse
-from fpsolve.case.kinds import parameters_of
+from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, VarySection, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.files import Unreadable, Words, read_text
@@ -29,15 +29,15 @@ _WORDS = Words("the sets", "a file of sets", "sets.csv", "comma-separated", _STA
 
 def vary_of(value: object, info: ValidationInfo) -> Vary:
     """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it."""
-    context = info.context or {}
     if isinstance(value, Vary):
         return value
     if not isinstance(value, dict):
         text = f"got {shown(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         raise ValueError(text)
-    if (parameters := parameters_of(info.data, context)) is None:
+    if (problem := problem_of(info.data)) is None:
         refuse([((), value, DEPENDENT)])
         return Vary()
+    parameters = parameters_of(problem)
     fields = {key: column_of(field, key) for key, field in parameters.items()} | VarySection.model_fields
     columns = checked(fields, flat(value, parameters))
     mode, file = columns.pop("mode", ""), columns.pop("file", "")
@@ -50,7 +50,7 @@ def vary_of(value: object, info: ValidationInfo) -> Vary:
     if mode == "product":
         refuse([(("mode",), mode, f"got {shown(mode)}; each row of a file is a set; remove it")])
     try:
-        return read_sets(file, context.get("folder", Path()), parameters)
+        return read_sets(file, (info.context or {}).get("folder", Path()), parameters)
     except Unreadable as error:
         place = file if error.line is None else f"{file}:{error.line}"
         refuse([(("file",), file, f"{place}: {error.sentence}")])

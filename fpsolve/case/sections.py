@@ -104,12 +104,10 @@ def _printed(text: str) -> str:
     if controls:
         accepted = "must have no control characters but line ends"
         raise ValueError(f"got {shown(text)}; {accepted}; leave out {', '.join(map(shown, controls))}")
-    if len(text) > MOST_TEXT:
-        raise ValueError(f"got {len(text)} letters; must be at most {MOST_TEXT}; shorten it")
     return text
 
 
-Text = Annotated[str, Field(min_length=1), AfterValidator(_printed)]
+Text = Annotated[str, Field(min_length=1, max_length=MOST_TEXT), AfterValidator(_printed)]
 
 
 def as_kind(kind: type) -> BeforeValidator:
