@@ -21,7 +21,7 @@ from fpsolve.results.known import names_of, read_into, record_of
 from fpsolve.solve import CurveResult, SimulatedCurve
 from fpsolve.solve.question import Job, Numerics
 from fpsolve.solve.sets import everything, result_of, solve_curve
-from fpsolve.solve.simulate import simulate_curve
+from fpsolve.solve.simulate import simulation_of
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
@@ -158,7 +158,7 @@ def solve_case(case: Case) -> list[CurveResult]:
 def simulate_curves(case: Case) -> list[SimulatedCurve]:
     """The simulation of every curve, without a folder."""
     orders = case.simulated.tolist()
-    return [simulate_curve(curve, orders, case.monte_carlo) for curve in case.curves()]
+    return [SimulatedCurve(curve, *simulation_of(curve, orders, case.monte_carlo)) for curve in case.curves()]
 
 
 def from_record(case: Case, curve: Any, record: Any) -> CurveResult:

@@ -378,10 +378,7 @@ class Case(Section):
     @cached_property
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
-        texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        words = {tuple(map(each.__getitem__, texts)) for each in self.vary.sets}
-        kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
-        return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
+        return any(each.is_possible and each.noise.approximates_spectrum for each in self.curves())
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""
@@ -407,7 +404,7 @@ class Case(Section):
         """With one system; without orders of moments where other quantities are named."""
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
-            refuse([(("oscillator",), data["oscillator"], text)])
+            refuse([(("oscillator",), text)])
         named = table_of(data.get("output")).get("quantities")
         is_of_p = not isinstance(named, list | tuple) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}

@@ -28,16 +28,14 @@ UNBOUNDED.annotation = float
 """The range of a parameter of which no more is known than that it is one."""
 
 Path = tuple[str | int, ...]
-Refusal = tuple[Path, object, str]
-"""Where, which value, and why."""
+Refusal = tuple[Path, str]
+"""Where, and why."""
 Fields = Mapping[str, FieldInfo]
 
 
 def refuse(refusals: Iterable[Refusal]) -> None:
     """Raise all refusals of a validator at once; without any, do nothing."""
-    details = [
-        InitErrorDetails(type=PydanticCustomError(_OWN, text), loc=path, input=value) for path, value, text in refusals
-    ]
+    details = [InitErrorDetails(type=PydanticCustomError(_OWN, text), loc=path, input=None) for path, text in refusals]
     if details:
         raise ValidationError.from_exception_data("case", details)
 
@@ -61,7 +59,7 @@ def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
 
 def told(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[Refusal]:
     """What pydantic found, in our words."""
-    return ((path, None, text) for path, _, text in explain(details, fields))
+    return ((path, text) for path, _, text in explain(details, fields))
 
 
 def is_number(value: object) -> TypeGuard[float]:

@@ -54,7 +54,7 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         try:
             made[name] = made_of(half, table[name])
         except ValidationError as error:
-            faults += (((name, *each["loc"]), each["input"], each["msg"]) for each in error.errors())
+            faults += (((name, *each["loc"]), each["msg"]) for each in error.errors())
     refuse(faults)
     return noises_of(made)
 
@@ -71,7 +71,7 @@ def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
         stated = " and ".join(f"[{section}]" for section in sections)
         found = " and ".join(f"[noise.{name}]" for name in names) or "[noise] alone"
         text = f"must be {stated} for this system, but is {found}; rename it, or name others in noises of [system]"
-        yield (), None, text
+        yield (), text
 
 
 def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
@@ -92,7 +92,7 @@ def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
         except (ValueError, TypeError) as error:
             if not faults:
                 path, text = (error.path, error.text) if isinstance(error, TableError) else ((), str(error))
-                refuse([(path, None, text)])
+                refuse([(path, text)])
     refuse(told(faults, known))
     return made
 
@@ -107,7 +107,7 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
     names = [*(SYSTEMS if half == "system" else NOISES)]
     if name is not None and name not in names:
         text = f"got {shown(name)}; must be one of {', '.join(names)};{nearest(name, names)}"
-        refuse([(("kind",), name, f'{text} write, for example, kind = "{names[0]}"')])
+        refuse([(("kind",), f'{text} write, for example, kind = "{names[0]}"')])
     kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 

@@ -49,7 +49,7 @@ def _read(name: object, folder: Path, *place: str) -> object:
         fault = f"cannot be read: {error}"
     must = f"must be a square matrix of finite numbers, of at most {MOST_MODES} rows, in a .npy, .mtx or .csv file"
     text = f"got {shown(name)}, which {fault}; {must} beside the case; write one, or rows of numbers here"
-    refuse([(place, name, text)] if fault else [])
+    refuse([(place, text)] if fault else [])
     return matrix.tolist()
 
 

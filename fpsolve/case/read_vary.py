@@ -35,7 +35,7 @@ def vary_of(value: object, info: ValidationInfo) -> Vary:
         text = f"got {shown(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         raise ValueError(text)
     if (problem := problem_of(info.data)) is None:
-        refuse([((), value, DEPENDENT)])
+        refuse([((), DEPENDENT)])
         return Vary()
     parameters = parameters_of(problem)
     fields = {key: column_of(field, key) for key, field in parameters.items()} | VarySection.model_fields
@@ -46,14 +46,14 @@ def vary_of(value: object, info: ValidationInfo) -> Vary:
         return Vary(columns, mode or "product")
     if columns:
         text = f"gives all values, so that [vary] may have no other key; leave out {', '.join(columns)}"
-        refuse([(("file",), file, f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
+        refuse([(("file",), f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
     if mode == "product":
-        refuse([(("mode",), mode, f"got {shown(mode)}; each row of a file is a set; remove it")])
+        refuse([(("mode",), f"got {shown(mode)}; each row of a file is a set; remove it")])
     try:
         return read_sets(file, (info.context or {}).get("folder", Path()), parameters)
     except Unreadable as error:
         place = file if error.line is None else f"{file}:{error.line}"
-        refuse([(("file",), file, f"{place}: {error.sentence}")])
+        refuse([(("file",), f"{place}: {error.sentence}")])
         raise
 
 
@@ -83,7 +83,7 @@ def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
         for i, _ in repeats((each,) for each in values)[:1]:
-            yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
+            yield (key, i), f"got {values[i]} twice; values must be distinct; remove one of them"
 
 
 def _uneven(columns: Columns) -> Iterator[Refusal]:
@@ -92,12 +92,12 @@ def _uneven(columns: Columns) -> Iterator[Refusal]:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{key} has {length}" for key, length in lengths.items())
         text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
-        yield (), None, text
+        yield (), text
         return
     for place, first in repeats(zip(*columns.values(), strict=True)):
         varied = {key: values[place] for key, values in columns.items()}
         text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
-        yield (next(iter(columns)), place), varied, text
+        yield (next(iter(columns)), place), text
 
 
 def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
@@ -141,7 +141,7 @@ def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
             key, *places = each["loc"]
             at = lines[int(places[0])] if places else first
             faults.append((at, f"{shortened(str(key)) or 'a column'}: {each['msg']}"))
-    refuse((("file",), None, f"{file}:{at}: {text}") for at, text in sorted(faults, key=itemgetter(0)))
+    refuse((("file",), f"{file}:{at}: {text}") for at, text in sorted(faults, key=itemgetter(0)))
     return Vary(columns, "zip", file, lines)
 
 

@@ -141,7 +141,7 @@ def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """A list without entries that stand twice."""
     first = dict[Any, int]()
     twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
-    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
+    refuse(((i,), f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
     return values
 
 
@@ -210,7 +210,7 @@ class Moments(Section):
             close = values[1:][np.diff(values) <= SAME]
         if close.size:
             text = f"{close[0]} stands twice; p must differ by more than {SAME:g}; remove one of them"
-            refuse([(("p",), self.p, text)])
+            refuse([(("p",), text)])
         return self
 
 
@@ -280,7 +280,7 @@ class MeshSection(Section):
         numbers = ", ".join(self.model_dump(exclude_none=True, exclude={"file"}))
         if self.file is not None and numbers:
             text = f"a mesh must be either a file or made from numbers; remove file, or remove {numbers}"
-            refuse([(("file",), self.file, text)])
+            refuse([(("file",), text)])
         return self
 
 
@@ -373,13 +373,13 @@ class FigureSection(Section):
         names = '{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"'
         if self.x == "p" and self.y != "moment":
             remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
-            refuse([(("y",), written, f"got {shown(written)}; {remedy}")])
+            refuse([(("y",), f"got {shown(written)}; {remedy}")])
         if self.x != "p" and self.y == "moment":
             text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
-            refuse([(("y",), self.y, text)])
+            refuse([(("y",), text)])
         if self.x != "p" and self.mark and "mark" in self.model_fields_set:
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
-            refuse([(("mark",), self.mark, text)])
+            refuse([(("mark",), text)])
         return self
 
 
@@ -434,11 +434,11 @@ class OutputSection(Section):
         ):
             if value and self.lacks(name):
                 text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
-                wrong.append(((name,), value, text))
+                wrong.append(((name,), text))
         for at, name in enumerate(self.names or ()):
             if name in OF_MOMENTS and self.lacks(MOMENT.name):
                 text = f"got {shown(name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
-                wrong.append((("quantities", at), name, text))
+                wrong.append((("quantities", at), text))
         refuse(wrong)
         return self
 
@@ -560,11 +560,11 @@ class Expectation(Section):
     def _complete(self) -> Self:
         refusals: list[Refusal] = []
         if self.quantity == "moment" and self.p is None:
-            refusals.append((("p",), None, "missing; a moment needs its order; add, for example, p = 2.0"))
+            refusals.append((("p",), "missing; a moment needs its order; add, for example, p = 2.0"))
         if self.quantity != "moment" and self.p is not None:
             text = f"got {self.p}; {self.quantity} does not depend on p; remove p, or check the moment"
-            refusals.append((("p",), self.p, text))
+            refusals.append((("p",), text))
         if self.rtol is None and self.atol is None:
-            refusals.append((("rtol",), None, "missing, and so is atol; add, for example, rtol = 1e-3"))
+            refusals.append((("rtol",), "missing, and so is atol; add, for example, rtol = 1e-3"))
         refuse(refusals)
         return self
