@@ -70,9 +70,9 @@ class Chart:
         for line in self.lines:
             reasons = (text for trace in line.traces for text in trace.obstacles)
             ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
-            holes = [each for each in line.scan.reasons if each not in line.obstacles]
+            holes = {each.code: each for each in line.scan.reasons if each not in line.obstacles}  # one of a kind
             found += [Message(Code.LINE_ENDS, line=line.target.equation, reason=each) for each in ends]
-            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes]
+            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes.values()]
         return tuple(message_of(each) for each in found if each)
 
 
