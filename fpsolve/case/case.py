@@ -451,7 +451,6 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     if any(map(is_control, name)) or not name.strip("."):  # which names the folder of its results
         text = "its name must have no control characters, and be more than dots; rename the file"
         faults.append(Fault("", None, text))
-    kinds = kinds_of(data)
     context = {"folder": Path(path).parent, "varies": bool(data.get("vary"))}
     try:
         case = Case.model_validate(data, context=context)
@@ -460,7 +459,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
-        fields = dict[str, FieldInfo]()
+        kinds, fields = kinds_of(data), dict[str, FieldInfo]()
         for key, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
             section = system_of(data) if key == "system" else key
             fields[section] = copy(field)

@@ -113,12 +113,12 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
 
 
 def kinds_of(data: Mapping[str, object]) -> dict[str, type[Parametrised]]:
-    """The kinds that the tables of a case name, by their sections, as far as there are such."""
-    system, noise, found = system_of(data), table_of(data.get("noise")), dict[str, type[Parametrised]]()
-    tables = {f"noise.{name}": noise[name] for name in names_of(noise)} or {"noise": noise}
-    for section, table in {system: data.get(system), **tables}.items():
+    """The kinds of the system and of an only noise, by their sections, as far as there are such."""
+    halves: dict[str, Half] = {system_of(data): "system", "noise": "noise"}
+    found = dict[str, type[Parametrised]]()
+    for section, half in halves.items():
         with suppress(ValidationError):
-            found[section] = _kind("system" if section == system else "noise", table_of(table))
+            found[section] = _kind(half, table_of(data.get(section)))
     return found
 
 

@@ -49,7 +49,7 @@ MAX_MOMENTS = 100_000
 MAX_NODES = 1000
 DIGITS = 12
 SAME = 10.0**-DIGITS
-"""p that differ by no more are one p; values of a varied key, relative to their size."""
+"""p that differ by no more are one p."""
 EXCURSIONS = "excursions"
 RESPONSE = "response"
 SENSITIVITIES = "sensitivities"
@@ -115,11 +115,14 @@ def as_kind(kind: type) -> BeforeValidator:
     return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
 
 
+def digits(value: Value) -> str:
+    """A value of a varied key as a text, by which it is told from others."""
+    return value if isinstance(value, str) else f"{value + 0.0:.{DIGITS}g}"
+
+
 def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
-    if str in (type(value), type(other)):
-        return value == other
-    return math.isclose(value, other, rel_tol=SAME)  # type: ignore[arg-type]
+    return digits(value) == digits(other)
 
 
 def flat(table: Mapping[str, Any], whole: Iterable[str] = ()) -> dict[str, Any]:
