@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from typing import Any, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, ValidationError, create_model
@@ -13,6 +14,8 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 from fpsolve.model.faults import TableError, fields_of, guess, nearest, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
+MOST_FAULTS = 1000
+"""Of so many at most it is sought what was meant, which takes long."""
 _OWN = "own sentence"
 LIST, TABLE, WORD, NUMBER = "<list>", "<table>", "<word>", "<number>"
 """Tags of what TOML has there, in a union that is told apart by that; parts of pydantic's places that are no keys."""
@@ -77,7 +80,7 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
         fields: of that model.
     """
     faults = list[tuple[Path, ErrorDetails]]()
-    for each in details:
+    for each in islice(details, MOST_FAULTS):
         reason = each.get("ctx", {}).get("error")
         inside = reason.path if isinstance(reason, TableError) else ()
         if each["type"] != "too_short" or len(each["input"]) < each["ctx"]["min_length"]:
