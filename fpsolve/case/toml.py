@@ -14,6 +14,7 @@ from fpsolve.arrays import shortened
 from fpsolve.case.keys import get, put
 from fpsolve.errors import CaseError, Fault
 from fpsolve.files import Unreadable, Words, read_text
+from fpsolve.messages import is_control
 from fpsolve.model.parameters import without_unit
 
 _BLANK = re.compile(r"(?:\s|#[^\n]*)*+")
@@ -165,6 +166,8 @@ class Document:
         try:
             if type(text) is not str:
                 raise ValueError("is no text")
+            if any(is_control(letter) and letter not in "\t\n" for letter in text):
+                raise ValueError("has control characters")
             text = _quoted_if_bare(text)
             assigned = Scanner(text).scan().assigned
             if len(assigned) != 1:
