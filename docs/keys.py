@@ -38,7 +38,8 @@ def range_of(field) -> str:
     found = []
     lengths = {name: value for rule in field.metadata for name in LENGTHS if (value := getattr(rule, name, None))}
     if len(lengths) == 2:
-        return f"{' to '.join(str(lengths[name]) for name in LENGTHS)} entries"
+        noun = "letters" if field.annotation is str else "entries"
+        return f"{' to '.join(str(lengths[name]) for name in LENGTHS)} {noun}"
     for rule in field.metadata:
         for name, sign in SIGNS.items():
             if (value := getattr(rule, name, None)) is not None:

@@ -18,10 +18,9 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.results.known import names_of, read_into, record_of
-from fpsolve.solve import CurveResult, SimulatedCurve
+from fpsolve.solve import CurveResult, SimulatedCurve, simulation_of
 from fpsolve.solve.question import Job, Numerics
 from fpsolve.solve.sets import everything, result_of, solve_curve
-from fpsolve.solve.simulate import simulate_curve
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
@@ -157,8 +156,10 @@ def solve_case(case: Case) -> list[CurveResult]:
 
 def simulate_curves(case: Case) -> list[SimulatedCurve]:
     """The simulation of every curve, without a folder."""
-    orders = case.simulated.tolist()
-    return [simulate_curve(curve, orders, case.monte_carlo) for curve in case.curves()]
+    return [
+        SimulatedCurve(curve, *simulation_of(curve, case.simulated.tolist(), case.monte_carlo))
+        for curve in case.curves()
+    ]
 
 
 def from_record(case: Case, curve: Any, record: Any) -> CurveResult:

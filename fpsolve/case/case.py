@@ -25,11 +25,10 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, require, shortened
-from fpsolve.case.explain import MOST_FAULTS, explain, refuse
+from fpsolve.case.explain import explain, refuse
 from fpsolve.case.kinds import half_of, kinds_of, system_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
-from fpsolve.case.removed import take_removed
 from fpsolve.case.sections import (
     EIGENFUNCTIONS,
     EVERYTHING,
@@ -56,7 +55,7 @@ from fpsolve.case.sections import (
     VarySection,
     as_kind,
 )
-from fpsolve.case.toml import Document, Place, dotted, read_document
+from fpsolve.case.toml import Document, Place, read_document
 from fpsolve.case.uncertain import Uncertain, uncertain_of
 from fpsolve.case.vary import Vary, assignments
 from fpsolve.errors import CaseError, Fault
@@ -379,10 +378,7 @@ class Case(Section):
     @cached_property
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
-        texts = [key for key in self.vary.keys if self.vary.is_text(key)]
-        words = {tuple(map(each.__getitem__, texts)) for each in self.vary.sets}
-        kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
-        return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
+        return any(each.is_possible and each.noise.approximates_spectrum for each in self.curves())
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""
@@ -408,7 +404,7 @@ class Case(Section):
         """With one system; without orders of moments where other quantities are named."""
         if {"oscillator", "system"} <= set(data):
             text = "stands beside [system], but a case has one system; remove one of the two"
-            refuse([(("oscillator",), data["oscillator"], text)])
+            refuse([(("oscillator",), text)])
         named = table_of(data.get("output")).get("quantities")
         is_of_p = not isinstance(named, list | tuple) or MOMENT.name in named
         return data if is_of_p else {"moments": Moments.model_construct(p=()), **data}
@@ -451,10 +447,11 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     require(path, str | Path, "path", "the path of a case file")
     require(overrides, list | tuple, "overrides", 'a list of texts, such as ["noise.D0=2.0"]')
     document = read_document(path, overrides, options)
-    faults, data = document.faults, document.data
-    faults += (document.fault(path, dotted(path), told) for path, told in take_removed(data))
-    kinds = kinds_of(data)
-    context = {"folder": Path(path).parent, "varies": bool(data.get("vary")), "kinds": kinds}
+    faults, data, name = document.faults, document.data, Path(path).stem
+    if any(map(is_control, name)) or not name.strip("."):  # which names the folder of its results
+        text = "its name must have no control characters, and be more than dots; rename the file"
+        faults.append(Fault("", None, text))
+    context = {"folder": Path(path).parent, "varies": bool(data.get("vary"))}
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it
@@ -462,29 +459,18 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:
-        if error.error_count() > MOST_FAULTS:
-            text = f"has over {MOST_FAULTS} faults; start from a copy of a case, see `fpsolve new`"
-            raise CaseError(str(path), [Fault("", None, text)]) from None
-        fields = dict[str, FieldInfo]()
-        for name, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
-            section = system_of(data) if name == "system" else name
+        kinds, fields = kinds_of(data), dict[str, FieldInfo]()
+        for key, field in Case.model_fields.items():  # of [system] and [noise] with the keys of their kinds
+            section = system_of(data) if key == "system" else key
             fields[section] = copy(field)
             fields[section].annotation = kinds.get(section, field.annotation)
         faults += (document.fault(*fault) for fault in explain(error.errors(), fields))
     except RecursionError:
         faults.append(Fault("", None, "tables are nested too deeply; name each key with its section only"))
-    faults += _faults_of_name(Path(path).stem)
     if faults:
         raise CaseError(str(path), sorted(faults, key=lambda fault: fault.line or 0))
     case._path, case._overrides, case._document = Path(path), tuple(overrides), document
     return case
-
-
-def _faults_of_name(name: str) -> Iterator[Fault]:
-    """Why a file's name without its ending, which names the folder of the results, is none of one."""
-    if any(map(is_control, name)) or name in (".", ".."):
-        text = f"got {json.dumps(name)} as the file's name without its ending, which names the folder of its results; "
-        yield Fault("", None, f"{text}must have no control characters, and be more than dots; rename the file")
 
 
 def _spread(p: FloatArray, most: int = 9) -> FloatArray:

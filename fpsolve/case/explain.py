@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, TypeGuard, get_args
+from itertools import islice
+from typing import Any, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, ValidationError, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from fpsolve.model.faults import MISSING, TableError, entry_of, fields_of, guess, nearest, sentence, written_path
+from fpsolve.model.faults import TableError, fields_of, guess, nearest, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
 MOST_FAULTS = 1000
-"""Of so many faults of a case at most each is told."""
+"""Of so many at most it is sought what was meant, which takes long."""
 _OWN = "own sentence"
 LIST, TABLE, WORD, NUMBER = "<list>", "<table>", "<word>", "<number>"
 """Tags of what TOML has there, in a union that is told apart by that; parts of pydantic's places that are no keys."""
@@ -30,16 +31,14 @@ UNBOUNDED.annotation = float
 """The range of a parameter of which no more is known than that it is one."""
 
 Path = tuple[str | int, ...]
-Refusal = tuple[Path, object, str]
-"""Where, which value, and why."""
+Refusal = tuple[Path, str]
+"""Where, and why."""
 Fields = Mapping[str, FieldInfo]
 
 
 def refuse(refusals: Iterable[Refusal]) -> None:
     """Raise all refusals of a validator at once; without any, do nothing."""
-    details = [
-        InitErrorDetails(type=PydanticCustomError(_OWN, text), loc=path, input=value) for path, value, text in refusals
-    ]
+    details = [InitErrorDetails(type=PydanticCustomError(_OWN, text), loc=path, input=None) for path, text in refusals]
     if details:
         raise ValidationError.from_exception_data("case", details)
 
@@ -57,13 +56,13 @@ def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
     try:
         return validated(fields, table)
     except ValidationError as error:
-        refuse(told(error.errors()[: MOST_FAULTS + 1], fields))
+        refuse(told(error.errors(), fields))
         raise
 
 
 def told(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[Refusal]:
     """What pydantic found, in our words."""
-    return ((path, None, text) for path, _, text in explain(details, fields))
+    return ((path, text) for path, _, text in explain(details, fields))
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -81,7 +80,7 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
         fields: of that model.
     """
     faults = list[tuple[Path, ErrorDetails]]()
-    for each in details:
+    for each in islice(details, MOST_FAULTS):
         reason = each.get("ctx", {}).get("error")
         inside = reason.path if isinstance(reason, TableError) else ()
         if each["type"] != "too_short" or len(each["input"]) < each["ctx"]["min_length"]:
@@ -91,7 +90,7 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
         if detail["type"] in _UNKNOWN and (known := guess(str(path[-1]), _known_keys(path, fields))):
             misspelt.add((*path[:-1], *known.split(".")))
     for path, detail in faults:
-        is_missing = detail["type"] == "missing" or detail["msg"].startswith(MISSING)
+        is_missing = detail["type"] == "missing" or detail["msg"].startswith("missing")
         if not (is_missing and path in misspelt) and detail["msg"] != DEPENDENT:
             yield path, written_path(path), _sentence(path, detail, fields)
 
@@ -116,6 +115,18 @@ def _sentence(path: Path, detail: ErrorDetails, fields: Fields) -> str:
     if type(path[-1]) is int:
         field = entry_of(field)
     return sentence(detail, field)
+
+
+def entry_of(field: FieldInfo) -> FieldInfo:
+    """The field of an entry of a list, with the words of the list; of what is none the field itself."""
+    inner: list[Any] = [field.annotation]
+    for kind in inner:
+        if get_origin(kind) is tuple:
+            entry = FieldInfo.from_annotation(get_args(kind)[0])
+            entry.description, entry.examples = field.description, field.examples
+            return entry
+        inner += get_args(kind)
+    return field
 
 
 def _beside(path: Path, fields: Fields) -> tuple[Fields, FieldInfo]:

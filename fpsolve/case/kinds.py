@@ -18,9 +18,8 @@ from pydantic_core import ErrorDetails
 
 from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
 from fpsolve.case.matrices import with_matrices
-from fpsolve.model.faults import TableError, fields_of, nearest, shown_with_kind, table_of
+from fpsolve.model.faults import TableError, fields_of, nearest, shown, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
-from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parametrised
 from fpsolve.model.problem import Problem
@@ -32,8 +31,6 @@ REDUCED = "ou-reduction"
 """The kind of a noise (7) whose treatment is this."""
 EQUATIONS, STATING = "equations", ("variables", "drift")
 """The kind of a [system] that names none, but states one of these."""
-REMOVED = {"plane": 'write the matrices as equations, for example variables = ["x", "v"], drift = ["v", "-x - xi*x"]'}
-"""Kinds that are no more, and what to write instead."""
 
 
 def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
@@ -57,7 +54,7 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         try:
             made[name] = made_of(half, table[name])
         except ValidationError as error:
-            faults += (((name, *each["loc"]), each["input"], each["msg"]) for each in error.errors())
+            faults += (((name, *each["loc"]), each["msg"]) for each in error.errors())
     refuse(faults)
     return noises_of(made)
 
@@ -69,21 +66,12 @@ def names_of(table: Any) -> list[str]:
 
 
 def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
-    """Noises that the system does not name; those that it names, if they are missing."""
-    wanted = [section.partition(".")[2] for section in sections]
-    told = f"the noise of the system, which is {sections[0]}"
-    if len(sections) > 1:
-        told = f"one of the noises of the system, which are {', '.join(sections)}"
-    for name in names:
-        if name not in wanted:
-            text = f"is not {told};{nearest(name, wanted)}"
-            yield (name,), name, f"{text} rename or remove it, or name it in noises of [system]"
-    if wanted != [""] and not names:
+    """Noises that are not those of the system, of which one has the section "noise" and no name."""
+    if {*names} != {section.partition(".")[2] for section in sections} - {""}:
         stated = " and ".join(f"[{section}]" for section in sections)
-        yield (), None, f"is not {told}; write {stated}, or name this in noises"
-    missing = [section for section, name in zip(sections, wanted, strict=True) if name not in names]
-    if missing and names and set(names) <= set(wanted):
-        yield (), None, f"lacks {' and '.join(missing)}; add a section for each, or leave it out of noises of [system]"
+        found = " and ".join(f"[noise.{name}]" for name in names) or "[noise] alone"
+        text = f"must be {stated} for this system, but is {found}; rename it, or name others in noises of [system]"
+        yield (), text
 
 
 def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
@@ -104,7 +92,7 @@ def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
         except (ValueError, TypeError) as error:
             if not faults:
                 path, text = (error.path, error.text) if isinstance(error, TableError) else ((), str(error))
-                refuse([(path, None, text)])
+                refuse([(path, text)])
     refuse(told(faults, known))
     return made
 
@@ -118,20 +106,19 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
         name = REDUCED
     names = [*(SYSTEMS if half == "system" else NOISES)]
     if name is not None and name not in names:
-        text = f"got {shown_with_kind(name, but=str)}; must be one of {', '.join(names)};{nearest(name, names)}"
-        remedy = REMOVED.get(str(name), f'write, for example, kind = "{names[0]}"')
-        refuse([(("kind",), name, f"{text} {remedy}")])
+        text = f"got {shown(name)}; must be one of {', '.join(names)};{nearest(name, names)}"
+        refuse([(("kind",), f'{text} write, for example, kind = "{names[0]}"')])
     kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 
 def kinds_of(data: Mapping[str, object]) -> dict[str, type[Parametrised]]:
-    """The kinds that the tables of a case name, by their sections, as far as there are such."""
-    system, noise, found = system_of(data), table_of(data.get("noise")), dict[str, type[Parametrised]]()
-    tables = {f"noise.{name}": noise[name] for name in names_of(noise)} or {"noise": noise}
-    for section, table in {system: data.get(system), **tables}.items():
+    """The kinds of the system and of an only noise, by their sections, as far as there are such."""
+    halves: dict[str, Half] = {system_of(data): "system", "noise": "noise"}
+    found = dict[str, type[Parametrised]]()
+    for section, half in halves.items():
         with suppress(ValidationError):
-            found[section] = _kind("system" if section == system else "noise", table_of(table))
+            found[section] = _kind(half, table_of(data.get(section)))
     return found
 
 
@@ -140,26 +127,10 @@ def system_of(data: Mapping[str, object]) -> str:
     return "system" if "system" in data else "oscillator"
 
 
-def parameters_of(valid: Mapping[str, Any], context: Mapping[str, Any]) -> dict[str, FieldInfo] | None:
-    """The parameters of a case by their keys, each with its range; None where not all are known.
-
-    Args:
-        valid: the sections that are.
-        context: with the kinds that the tables name.
-    """
-    if problem := problem_of(valid):
-        known = problem.parameters.items()
-        return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
-    kinds: Mapping[str, type[Parametrised]] = context.get("kinds", {})
-    if len({issubclass(kind, Noise) for kind in kinds.values()}) < 2 or not all(
-        kind.fields() for kind in kinds.values()
-    ):
-        return None
-    return {
-        f"{section if issubclass(kind, Noise) else kind.section}.{name}": fields_of(kind)[name]
-        for section, kind in kinds.items()
-        for name in (*kind.fields(), *kind.words)
-    }
+def parameters_of(problem: Problem) -> dict[str, FieldInfo]:
+    """The parameters of a problem by their keys, each with its range."""
+    known = problem.parameters.items()
+    return {key: fields_of(each.kind).get(key.rpartition(".")[2], UNBOUNDED) for key, each in known}
 
 
 def problem_of(valid: Mapping[str, Any]) -> Problem | None:

@@ -14,12 +14,12 @@ from pydantic import AfterValidator, Field, Tag, ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import shortened
-from fpsolve.case.explain import BY_KIND, DEPENDENT, LIST, TABLE, Fields, Refusal, checked, refuse
-from fpsolve.case.kinds import parameters_of
+from fpsolve.case.explain import BY_KIND, DEPENDENT, LIST, TABLE, Fields, Refusal, checked, entry_of, refuse
+from fpsolve.case.kinds import parameters_of, problem_of
 from fpsolve.case.sections import MAX_MOMENTS, Sweep, VarySection, flat
 from fpsolve.case.vary import Column, Columns, Vary, assignments, repeats
 from fpsolve.files import Unreadable, Words, read_text
-from fpsolve.model.faults import TableError, choices, entry_of, shown, shown_with_kind
+from fpsolve.model.faults import choices, shown
 from fpsolve.model.parameters import example_of, meaning_of
 
 EXAMPLE = '[vary] with "noise.D0" = [0.1, 0.5, 1.0]'
@@ -29,15 +29,15 @@ _WORDS = Words("the sets", "a file of sets", "sets.csv", "comma-separated", _STA
 
 def vary_of(value: object, info: ValidationInfo) -> Vary:
     """What [vary] means; a `Vary` is left. Raises ValidationError with all that is wrong with it."""
-    context = info.context or {}
     if isinstance(value, Vary):
         return value
     if not isinstance(value, dict):
-        text = f"got {shown_with_kind(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
+        text = f"got {shown(value)}; must be a table of lists and ranges; write, for example, {EXAMPLE}"
         raise ValueError(text)
-    if (parameters := parameters_of(info.data, context)) is None:
-        refuse([((), value, DEPENDENT)])
+    if (problem := problem_of(info.data)) is None:
+        refuse([((), DEPENDENT)])
         return Vary()
+    parameters = parameters_of(problem)
     fields = {key: column_of(field, key) for key, field in parameters.items()} | VarySection.model_fields
     columns = checked(fields, flat(value, parameters))
     mode, file = columns.pop("mode", ""), columns.pop("file", "")
@@ -46,14 +46,14 @@ def vary_of(value: object, info: ValidationInfo) -> Vary:
         return Vary(columns, mode or "product")
     if columns:
         text = f"gives all values, so that [vary] may have no other key; leave out {', '.join(columns)}"
-        refuse([(("file",), file, f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
+        refuse([(("file",), f"{text}, as by --set 'vary={{ file = {shown(file)} }}'")])
     if mode == "product":
-        refuse([(("mode",), mode, f"got {shown(mode)}; each row of a file is a set; remove it")])
+        refuse([(("mode",), f"got {shown(mode)}; each row of a file is a set; remove it")])
     try:
-        return read_sets(file, context.get("folder", Path()), parameters)
+        return read_sets(file, (info.context or {}).get("folder", Path()), parameters)
     except Unreadable as error:
         place = file if error.line is None else f"{file}:{error.line}"
-        refuse([(("file",), file, f"{place}: {error.sentence}")])
+        refuse([(("file",), f"{place}: {error.sentence}")])
         raise
 
 
@@ -70,11 +70,7 @@ def column_of(field: FieldInfo, key: str = "") -> FieldInfo:
 
     def listed(sweep: Sweep) -> Column:
         checked(dict.fromkeys(("start", "stop"), entry_of(found)), {"start": sweep.start, "stop": sweep.stop})
-        values = tuple(sweep.values.tolist())
-        if repeats((each,) for each in values):
-            text = f"got num = {sweep.num}, which makes values equal to 12 digits; use a smaller num, or ends further "
-            raise TableError(f"{text}apart", "num")
-        return values
+        return tuple(sweep.values.tolist())
 
     between = Annotated[Sweep, AfterValidator(listed)]
     annotation: Any = some if texts else Annotated[Annotated[some, Tag(LIST)] | Annotated[between, Tag(TABLE)], BY_KIND]
@@ -86,8 +82,8 @@ def column_of(field: FieldInfo, key: str = "") -> FieldInfo:
 def _repeated(columns: Columns) -> Iterator[Refusal]:
     """The values of a product that a key has already."""
     for key, values in columns.items():
-        for i, _ in repeats((each,) for each in values):
-            yield (key, i), values[i], f"got {values[i]} twice; values must be distinct; remove one of them"
+        for i, _ in repeats((each,) for each in values)[:1]:
+            yield (key, i), f"got {values[i]} twice; values must be distinct; remove one of them"
 
 
 def _uneven(columns: Columns) -> Iterator[Refusal]:
@@ -96,12 +92,12 @@ def _uneven(columns: Columns) -> Iterator[Refusal]:
     if len(set(lengths.values())) > 1:
         told = ", ".join(f"{key} has {length}" for key, length in lengths.items())
         text = f'{told}; with mode = "zip" all must have one length; complete the shorter ones, or use mode = "product"'
-        yield (), None, text
+        yield (), text
         return
     for place, first in repeats(zip(*columns.values(), strict=True)):
         varied = {key: values[place] for key, values in columns.items()}
         text = f"sets {first + 1} and {place + 1} are both {assignments(varied)}; must be distinct; remove one of them"
-        yield (next(iter(columns)), place), varied, text
+        yield (next(iter(columns)), place), text
 
 
 def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
@@ -145,7 +141,7 @@ def read_sets(file: str, folder: Path, parameters: Fields) -> Vary:
             key, *places = each["loc"]
             at = lines[int(places[0])] if places else first
             faults.append((at, f"{shortened(str(key)) or 'a column'}: {each['msg']}"))
-    refuse((("file",), None, f"{file}:{at}: {text}") for at, text in sorted(faults, key=itemgetter(0)))
+    refuse((("file",), f"{file}:{at}: {text}") for at, text in sorted(faults, key=itemgetter(0)))
     return Vary(columns, "zip", file, lines)
 
 

@@ -46,16 +46,16 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
         method = choose(problem)
         is_told = method.is_computed and not (context.get("varies") and method.has_pairs)
         if text := obstacle(problem, {}, moments.values, with_moments=is_told):
-            yield (), None, text
+            yield (), text
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
     problem, moments = problem_of(valid), valid.get("moments")
     if len(vary) > MAX_CURVES:
-        yield (), None, f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
+        yield (), f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
     elif problem and moments and (text := obstacle(problem, vary.sets[0], moments.values, with_moments=False)):
-        yield ("file",) if vary.file else (), None, vary.line_of(1) + _with(vary.sets[0]) + text
+        yield ("file",) if vary.file else (), vary.line_of(1) + _with(vary.sets[0]) + text
 
 
 def _with(varied: Varied) -> str:
@@ -96,18 +96,18 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
         text = f";{nearest(figure.x, known)} must be p or a key of [vary]: {', '.join(known)}; add it to [vary]"
         if figure.x in vary.keys:
             text = f", whose values are texts; must be one of {', '.join(known)}; choose one of them"
-        yield ("x",), figure.x, f"got {shown(figure.x)}{text}"
+        yield ("x",), f"got {shown(figure.x)}{text}"
         return
     if figure.map and vary.crossing(figure.x) is None:
         text = (
             'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more, '
             "and x to be one of them; vary two such keys, or remove it"
         )
-        yield ("map",), figure.map, text
+        yield ("map",), text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):
         if key in vary.keys and limits and limits[0] <= 0 and is_log_spaced(vary.values(key)):
             text = f"got {shown(limits)}; must be > 0, as the values of {key} differ by factors, so that its axis is "
-            yield (name,), limits, f"{text}logarithmic; raise the smaller one"
+            yield (name,), f"{text}logarithmic; raise the smaller one"
 
 
 def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -116,18 +116,18 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     if problem and output.lists_quantities:
         for name in {*(output.names or ())} & INDICES.keys():
             if told := choose(problem).reason(0.0, INDICES[name].symbol):
-                yield ("quantities",), output.quantities, told
+                yield ("quantities",), told
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
     figure: FigureSection = valid.get("figure", FigureSection())
     drawn = figure.model_fields_set
     if drawn & {"x", "y"} and output.lacks(figure.needed):
         text = f"has no {shown(figure.needed)}, which figure.y draws; add it, or let figure.y be one of the names here"
-        yield ("quantities",), output.quantities, text
+        yield ("quantities",), text
     for name in figure.mark if "mark" in drawn else ():
         if output.lacks(name):
             text = f"has no {shown(name)}, which figure.mark marks; add it, or remove it from figure.mark"
-            yield ("quantities",), output.quantities, text
+            yield ("quantities",), text
 
 
 def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) -> Iterator[Refusal]:
@@ -141,19 +141,19 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
         if problem and item.of_response and item.of_response not in numbers:
             names = quoted(f"{RESPONSE}.{each}" for each in numbers)
             text = f'got "{item.quantity}"; must be one of {names} for this system; choose one of these'
-            yield (i, "quantity"), item.quantity, text
+            yield (i, "quantity"), text
         if vary is None:
             continue
         for key, value in item.where.items():
             if key not in vary.keys:
                 guess, known = nearest(key, vary.keys), ", ".join(vary.keys) or "none"
                 text = f"is not varied;{guess} varied keys: {known}; add it to [vary], {remove}"
-                yield (i, "where", key), value, text
+                yield (i, "where", key), text
             elif not any(same(value, other) for other in vary.values(key)):
                 is_possible = (type(value) is str) == vary.is_text(key)
                 remedy = f"add it to [vary], {remove}" if is_possible else "write one of these"
                 text = f"got {shown(value)}; must be one of {shown(vary.values(key))}; {remedy}"
-                yield (i, "where", key), value, text
+                yield (i, "where", key), text
 
 
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -169,7 +169,7 @@ def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> I
     try:
         check_start(made, section.phi, section.xi)
     except ValueError as error:
-        yield ("xi",), section.xi, f"{_with(vary.sets[0])}{error}"
+        yield ("xi",), f"{_with(vary.sets[0])}{error}"
 
 
 def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iterator[Refusal]:
@@ -178,7 +178,7 @@ def _of_response(section: ResponseSection, valid: Known, context: Known) -> Iter
     yield from () if section.off else _unwanted(RESPONSE, section, valid)
     if section.off and output.lists_quantities and not output.lacks(RESPONSE):
         text = f'got true, but output.quantities names "{RESPONSE}"; remove one of the two'
-        yield ("off",), True, text
+        yield ("off",), text
 
 
 def _unwanted(name: str, section: Section, valid: Known) -> Iterator[Refusal]:
@@ -186,7 +186,7 @@ def _unwanted(name: str, section: Section, valid: Known) -> Iterator[Refusal]:
     output: OutputSection = valid.get("output", OutputSection())
     if section.model_fields_set and output.lacks(name):
         text = f'stands here, but output.quantities has no "{name}"; add it there, or remove this section'
-        yield (), None, text
+        yield (), text
 
 
 def _without(key: str) -> str:
@@ -201,7 +201,7 @@ def _of_orders(valid: Known, wanted: Iterable[tuple[tuple[str | int, ...], float
             values = moments.values
             ends = f"{values[0]:g} to {values[-1]:g}" if values.size else "none is stated"
             known = f"moments.p ({values.size} values, {ends})"
-            yield path, p, f"got {p}; must be among {known}; add it there, {remedy}"
+            yield path, f"got {p}; must be among {known}; add it there, {remedy}"
 
 
 REFUSALS: Mapping[str, Callable[[Any, Known, Known], Iterator[Refusal]]] = {

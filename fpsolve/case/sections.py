@@ -49,7 +49,7 @@ MAX_MOMENTS = 100_000
 MAX_NODES = 1000
 DIGITS = 12
 SAME = 10.0**-DIGITS
-"""p that differ by no more are one p; values of a varied key, relative to their size."""
+"""p that differ by no more are one p."""
 EXCURSIONS = "excursions"
 RESPONSE = "response"
 SENSITIVITIES = "sensitivities"
@@ -104,12 +104,10 @@ def _printed(text: str) -> str:
     if controls:
         accepted = "must have no control characters but line ends"
         raise ValueError(f"got {shown(text)}; {accepted}; leave out {', '.join(map(shown, controls))}")
-    if len(text) > MOST_TEXT:
-        raise ValueError(f"got {len(text)} letters; must be at most {MOST_TEXT}; shorten it")
     return text
 
 
-Text = Annotated[str, Field(min_length=1), AfterValidator(_printed)]
+Text = Annotated[str, Field(min_length=1, max_length=MOST_TEXT), AfterValidator(_printed)]
 
 
 def as_kind(kind: type) -> BeforeValidator:
@@ -117,11 +115,14 @@ def as_kind(kind: type) -> BeforeValidator:
     return BeforeValidator(lambda value: kind(**value) if isinstance(value, dict) else value)
 
 
+def digits(value: Value) -> str:
+    """A value of a varied key as a text, by which it is told from others."""
+    return value if isinstance(value, str) else f"{value + 0.0:.{DIGITS}g}"
+
+
 def same(value: Value, other: Value) -> bool:
     """Whether two values of a varied key are one."""
-    if str in (type(value), type(other)):
-        return value == other
-    return math.isclose(value, other, rel_tol=SAME)  # type: ignore[arg-type]
+    return digits(value) == digits(other)
 
 
 def flat(table: Mapping[str, Any], whole: Iterable[str] = ()) -> dict[str, Any]:
@@ -143,7 +144,7 @@ def _distinct(values: tuple[Any, ...]) -> tuple[Any, ...]:
     """A list without entries that stand twice."""
     first = dict[Any, int]()
     twice = [(i, each) for i, each in enumerate(values) if first.setdefault(each, i) != i]
-    refuse(((i,), each, f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
+    refuse(((i,), f"got {shown(each)} twice; values must be distinct; remove one") for i, each in twice)
     return values
 
 
@@ -212,7 +213,7 @@ class Moments(Section):
             close = values[1:][np.diff(values) <= SAME]
         if close.size:
             text = f"{close[0]} stands twice; p must differ by more than {SAME:g}; remove one of them"
-            refuse([(("p",), self.p, text)])
+            refuse([(("p",), text)])
         return self
 
 
@@ -282,7 +283,7 @@ class MeshSection(Section):
         numbers = ", ".join(self.model_dump(exclude_none=True, exclude={"file"}))
         if self.file is not None and numbers:
             text = f"a mesh must be either a file or made from numbers; remove file, or remove {numbers}"
-            refuse([(("file",), self.file, text)])
+            refuse([(("file",), text)])
         return self
 
 
@@ -375,13 +376,13 @@ class FigureSection(Section):
         names = '{ moment = 2.0 }, "lyapunov_exponent" or "stability_index"'
         if self.x == "p" and self.y != "moment":
             remedy = 'must be "moment" where x = "p"; write y = "moment", or set x to a key of [vary]'
-            refuse([(("y",), written, f"got {shown(written)}; {remedy}")])
+            refuse([(("y",), f"got {shown(written)}; {remedy}")])
         if self.x != "p" and self.y == "moment":
             text = f'got {shown(written)}; must be {names} where x is not "p"; write one of these'
-            refuse([(("y",), self.y, text)])
+            refuse([(("y",), text)])
         if self.x != "p" and self.mark and "mark" in self.model_fields_set:
             text = f'got {shown(self.mark)}; only Λ(p) over p has marks; write x = "p", or remove it'
-            refuse([(("mark",), self.mark, text)])
+            refuse([(("mark",), text)])
         return self
 
 
@@ -436,11 +437,11 @@ class OutputSection(Section):
         ):
             if value and self.lacks(name):
                 text = f'got {shown(value)}, but output.quantities has no "{name}"; add it there, or write {instead}'
-                wrong.append(((name,), value, text))
+                wrong.append(((name,), text))
         for at, name in enumerate(self.names or ()):
             if name in OF_MOMENTS and self.lacks(MOMENT.name):
                 text = f"got {shown(name)}, which follows from Λ(p); add {shown(MOMENT.name)}, or remove it"
-                wrong.append((("quantities", at), name, text))
+                wrong.append((("quantities", at), text))
         refuse(wrong)
         return self
 
@@ -476,13 +477,6 @@ class ChartSection(Section):
             le=0.1,
         ),
     ] = None
-
-    @model_validator(mode="after")
-    def _two_parameters(self) -> Self:
-        if self.x.key == self.y.key:
-            text = f'got "{self.y.key}" for both axes; must be two parameters; choose another for one of them'
-            refuse([(("y", "key"), self.y.key, text)])
-        return self
 
 
 class ExcursionSection(Section):
@@ -569,11 +563,11 @@ class Expectation(Section):
     def _complete(self) -> Self:
         refusals: list[Refusal] = []
         if self.quantity == "moment" and self.p is None:
-            refusals.append((("p",), None, "missing; a moment needs its order; add, for example, p = 2.0"))
+            refusals.append((("p",), "missing; a moment needs its order; add, for example, p = 2.0"))
         if self.quantity != "moment" and self.p is not None:
             text = f"got {self.p}; {self.quantity} does not depend on p; remove p, or check the moment"
-            refusals.append((("p",), self.p, text))
+            refusals.append((("p",), text))
         if self.rtol is None and self.atol is None:
-            refusals.append((("rtol",), None, "missing, and so is atol; add, for example, rtol = 1e-3"))
+            refusals.append((("rtol",), "missing, and so is atol; add, for example, rtol = 1e-3"))
         refuse(refusals)
         return self

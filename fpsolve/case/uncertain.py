@@ -14,7 +14,7 @@ from fpsolve.case.explain import DEPENDENT, checked, refuse
 from fpsolve.case.kinds import problem_of
 from fpsolve.case.sections import UNCERTAIN, Deviation, StandardDeviation, flat
 from fpsolve.case.vary import Vary
-from fpsolve.model.faults import shown, shown_with_kind
+from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 
 _FIELD = FieldInfo.from_annotated_attribute(cast("type[object]", Deviation), None)
@@ -46,16 +46,16 @@ def uncertain_of(value: object, info: ValidationInfo) -> Uncertain:
     if isinstance(value, Uncertain):
         return value
     if not isinstance(value, dict):
-        raise ValueError(f"got {shown_with_kind(value)}; must be a table; write, for example, {UNCERTAIN}")
+        raise ValueError(f"got {shown(value)}; must be a table; write, for example, {UNCERTAIN}")
     if (problem := problem_of(info.data)) is None:
-        refuse([((), value, DEPENDENT)])
+        refuse([((), DEPENDENT)])
         return Uncertain()
     known, vary = dict.fromkeys(problem.differentiable, _FIELD), info.data.get("vary", Vary())
     found = dict[str, Stated]()
     for key, each in checked(known, flat(value, problem.parameters)).items():
         found[key] = each.model_dump() if isinstance(each, StandardDeviation) else each
     refuse(
-        ((key,), each, f"got {shown(each)}, but a share of {key} = 0 is 0; write {{ sd = number }}")
+        ((key,), f"got {shown(each)}, but a share of {key} = 0 is 0; write {{ sd = number }}")
         for key, each in found.items()
         if key not in vary.keys and not deviation_of(each, float(problem.values[key]))
     )

@@ -9,7 +9,7 @@ from functools import cached_property
 from itertools import product
 from typing import Literal
 
-from fpsolve.case.sections import DIGITS, MOST_NAMED, FigureSection, Value
+from fpsolve.case.sections import MOST_NAMED, FigureSection, Value, digits
 from fpsolve.data import written
 from fpsolve.model.quantity import Quantity
 
@@ -94,9 +94,5 @@ def legend(varied: Mapping[str, Value], about: Callable[[str], Quantity]) -> str
 def repeats(rows: Iterable[Sequence[Value]]) -> list[tuple[int, int]]:
     """The places of rows that stand there already, to 12 digits, each with the first place."""
     first = dict[tuple[str, ...], int]()
-    places = (first.setdefault(tuple(map(_digits, row)), place) for place, row in enumerate(rows))
+    places = (first.setdefault(tuple(map(digits, row)), place) for place, row in enumerate(rows))
     return [(place, each) for place, each in enumerate(places) if each != place]
-
-
-def _digits(value: Value) -> str:
-    return value if isinstance(value, str) else f"{value + 0.0:.{DIGITS}g}"

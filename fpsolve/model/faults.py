@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, is_dataclass
 from difflib import get_close_matches
 from enum import Enum
-from fractions import Fraction
 from functools import wraps
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, cast, dataclass_transform, get_args, get_origin
@@ -20,17 +18,11 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from fpsolve.arrays import shortened
-from fpsolve.messages import is_control
 from fpsolve.model.parameters import STRICT, Parametrised, example_of, meaning_of, without_unit
 
 Kind = TypeVar("Kind")
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 _NOUNS: dict[Any, str] = {float: "finite number", int: "whole number", str: "string", bool: "boolean"}
-_KINDS = {bool: "a boolean", str: "a string", list: "a list", dict: "a table", int: "a number", float: "a number"}
-MISSING = "missing"
-"""The first word about what is missing."""
-_TELL_KIND = ("_type", "_not_found", "_tag_invalid", "_instance_of")
-"""Endings of pydantic's errors of which it matters what a value is."""
 
 
 class ParameterError(ValidationError):
@@ -59,9 +51,6 @@ class TableError(ValueError):
         place = written_path(path)
         super().__init__(f"{place}: {text}" if place else text)
         self.text, self.path = text, path
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return TableError, (self.text, *self.path)
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=False, field_specifiers=(Field,))
@@ -110,16 +99,16 @@ def sentence(detail: ErrorDetails, field: FieldInfo) -> str:
         field: what it must be.
     """
     kind, value, meaning, example = detail["type"], detail["input"], meaning_of(field), example_of(field)
-    if kind == "too_long":
-        noun = "entries" if any(type(each) is str for each in value) else "numbers"
-        return f"lists {len(value)} {noun}; must be at most {detail['ctx']['max_length']}; list fewer"
-    must = f"must be {accepted(field)}" + (f" ({meaning})" if meaning else "")
+    if kind.endswith("too_long"):
+        return f"has the length {len(value)}; must be at most {detail['ctx']['max_length']}; shorten it"
+    must = "must not be empty" if kind.endswith("too_short") else f"must be {accepted(field)}"
+    must += f" ({meaning})" if meaning else ""
     if kind == "missing":
-        return f"{MISSING}; {must}" + (f"; add it, for example {example}" if example else "")
-    has_kind = kind.endswith(_TELL_KIND) or (kind == "literal_error" and type(value) is not str)
-    hint = nearest(value, _texts(field.annotation)) + (f" write, for example, {example}" if example else "")
+        return f"missing; {must}" + (f"; add it, for example {example}" if example else "")
+    hint = nearest(value, choices(field.annotation)) + (f" write, for example, {example}" if example else "")
     remedy = without_unit(value) or (f";{hint}" if hint else "")
-    return f"got {shown_with_kind(value) if has_kind else shown(value)}; {must}{remedy}"
+    foreign = "" if isinstance(value, int | float | str | list | tuple | dict) else f" ({type(value).__name__})"
+    return f"got {shown(value)}{foreign}; {must}{remedy}"
 
 
 def shown(value: object) -> str:
@@ -130,22 +119,14 @@ def shown(value: object) -> str:
         return "a value too long to show"
 
 
-def shown_with_kind(value: object, *, but: type | None = None) -> str:
-    """A value as TOML writes it with what it is, but for one kind: "3 (a number)"."""
-    kind = _KINDS.get(type(value)) or f"a {type(value).__name__}"
-    return shown(value) if type(value) is but else f"{shown(value)} ({kind})"
-
-
 def _toml(value: object) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_toml, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + "}"
-    if type(value) not in (bool, str):
+    if not isinstance(value, bool | str):
         return " ".join(str(value).split())
-    return "".join(
-        json.dumps(each)[1:-1] if is_control(each) else each for each in json.dumps(value, ensure_ascii=False)
-    )
+    return json.dumps(value, ensure_ascii=False)
 
 
 def nearest(name: object, known: Iterable[str]) -> str:
@@ -164,59 +145,25 @@ def guess(name: str, known: Iterable[str]) -> str | None:
 
 def accepted(field: FieldInfo) -> str:
     """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
-    bounds = " and ".join(f"{_SIGNS[name]} {_number(bound)}" for name, bound in bounds_in(field).items())
-    return f"{_with_article(_not_empty(field.metadata) + _noun(field.annotation))} {bounds}".rstrip()
+    bounds = " and ".join(f"{_SIGNS[name]} {bound:.15g}" for name, bound in bounds_in(field).items())
+    return f"{_noun(field.annotation)} {bounds}".rstrip()
 
 
 def bounds_in(field: FieldInfo) -> dict[str, float]:
     """The ends of the range of a number, by "ge", "gt", "le" or "lt"."""
-    return {name: bound for name, bound in _limits(field.metadata).items() if name in _SIGNS}
-
-
-def _limits(metadata: Iterable[object]) -> dict[str, Any]:
-    """What the constraints of a field state, by their names, such as "min_length"."""
-    return {
-        name: limit
-        for each in metadata
-        if is_dataclass(each) and not isinstance(each, type)
-        for name, limit in asdict(each).items()
-    }
-
-
-def _not_empty(metadata: Iterable[object]) -> str:
-    return "non-empty " if _limits(metadata).get("min_length") else ""
-
-
-def _number(bound: float) -> str:
-    """5/3, and the float below it, as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
-    fraction = Fraction(bound).limit_denominator(99)
-    is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
-    return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")
-
-
-def entry_of(field: FieldInfo) -> FieldInfo:
-    """The field of an entry of a list, with the words of the list; of what is none the field itself."""
-    inner: list[Any] = [field.annotation]
-    for kind in inner:
-        if get_origin(kind) is tuple:
-            entry = FieldInfo.from_annotation(get_args(kind)[0])
-            entry.description, entry.examples = field.description, field.examples
-            return entry
-        inner += get_args(kind)
-    return field
+    rules = dict[str, float]()
+    for each in field.metadata:
+        rules |= asdict(each) if is_dataclass(each) and not isinstance(each, type) else {}
+    return {name: rules[name] for name in _SIGNS if name in rules}
 
 
 def choices(annotation: object) -> list[str]:
-    """The texts that an annotation takes, if these are all."""
+    """The texts in an annotation such as `DrawnName | MomentAt`."""
     if get_origin(annotation) is Literal:
         return list(get_args(annotation))
-    is_enum = isinstance(annotation, type) and issubclass(annotation, Enum)
-    return [member.value for member in cast("type[Enum]", annotation)] if is_enum else []
-
-
-def _texts(annotation: object) -> list[str]:
-    """The texts in an annotation such as `DrawnName | MomentAt`."""
-    return choices(annotation) or [text for each in get_args(annotation) for text in _texts(each)]
+    if isinstance(annotation, type) and issubclass(annotation, Enum):
+        return [member.value for member in annotation]
+    return [text for each in get_args(annotation) for text in choices(each)]
 
 
 def fields_of(annotation: object) -> Mapping[str, FieldInfo]:
@@ -239,35 +186,32 @@ def written_path(path: Iterable[str | int]) -> str:
     """("expect", 0, "p") as expect[0].p."""
     text = ""
     for part in path:
-        key = str(part) if re.fullmatch(r"[\w-]+", str(part)) else json.dumps(part, ensure_ascii=False)
-        text += f"[{part}]" if isinstance(part, int) else f".{key}" if text else key
-    return text
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += f".{part}" if re.fullmatch(r"[\w-]+", part) else f".{_toml(part)}"
+    return text.removeprefix(".")
 
 
 def quoted(names: Iterable[str]) -> str:
     """Names as TOML lists them."""
-    return ", ".join(f'"{name}"' for name in names)
-
-
-def _with_article(noun: str) -> str:
-    return noun if noun.startswith(('"', "one of")) else f"a {noun}"
+    return ", ".join(map(_toml, names))
 
 
 def _noun(annotation: Any, plural: str = "") -> str:
-    """An annotation in words: tuple[float, ...] as "list of finite numbers"."""
+    """An annotation in words: tuple[float, ...] as "a list of finite numbers"."""
+    article = "" if plural else "a "
     if fields := fields_of(annotation):
-        return f"table{plural} with the keys {', '.join(fields)}"
+        return f"{article}table{plural} with the keys {', '.join(fields)}"
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
-        inner = [each for extra in arguments[1:] if isinstance(extra, FieldInfo) for each in extra.metadata]
-        return _not_empty(inner) + _noun(arguments[0], plural)
+        return _noun(arguments[0], plural)
     if origin in (Union, UnionType):
-        first, *others = (_noun(argument, plural) for argument in arguments if argument is not NoneType)
-        return " or ".join([first, *(others if plural else map(_with_article, others))])
+        return " or ".join(_noun(argument, plural) for argument in arguments if argument is not NoneType)
+    if origin is tuple:
+        return f"{article}list{plural} of {_noun(arguments[0], 's')}"
+    if origin is dict:
+        return f"{article}table{plural} of {_noun(arguments[1], 's')}"
     if texts := choices(annotation):
         return f"{'some' if plural else 'one'} of {quoted(texts)}" if len(texts) > 1 else quoted(texts)
-    if origin is tuple:
-        return f"list{plural} of {_noun(arguments[0], 's')}"
-    if origin is dict:
-        return f"table{plural} of {_noun(arguments[1], 's')}"
-    return _NOUNS.get(annotation, "value") + plural
+    return f"{article}{_NOUNS.get(annotation, 'value')}{plural}"

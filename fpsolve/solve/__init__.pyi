@@ -9,4 +9,4 @@ from .question import Job as Job
 from .question import Question as Question
 from .questions import QUESTIONS as QUESTIONS
 from .sets import solve_curve as solve_curve
-from .simulate import simulate_curve as simulate_curve
+from .simulate import simulation_of as simulation_of

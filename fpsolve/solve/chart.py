@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 from contourpy import contour_generator
@@ -19,9 +18,7 @@ from fpsolve.analysis.stability import Boundary, Solve, crossed, is_of_line, unt
 from fpsolve.analysis.target import Target
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.refusals import obstacle
 from fpsolve.case.sections import ChartSection
-from fpsolve.case.vary import assignments
 from fpsolve.errors import NoPerturbationTheory
 from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message, message_of
@@ -73,9 +70,9 @@ class Chart:
         for line in self.lines:
             reasons = (text for trace in line.traces for text in trace.obstacles)
             ends = dict.fromkeys(each for each in reasons if each not in line.obstacles)
-            holes = [each for each in line.scan.reasons if each not in line.obstacles]
+            holes = {each.code: each for each in line.scan.reasons if each not in line.obstacles}  # one of a kind
             found += [Message(Code.LINE_ENDS, line=line.target.equation, reason=each) for each in ends]
-            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes]
+            found += [Message(Code.HOLES, symbol=line.target.symbol, reason=each) for each in holes.values()]
         return tuple(message_of(each) for each in found if each)
 
 
@@ -104,11 +101,6 @@ def refuse_no_chart(case: Case) -> None:
     if set(case.vary.keys) - {frame.x.key, frame.y.key}:
         text = "a chart has one set of the other parameters; remove [vary], or write --set vary={}"
         raise case.refusal(text, "vary")
-    p = np.array([target.order for target in frame.lines])
-    for x, y in product((frame.x.start, frame.x.stop), (frame.y.start, frame.y.stop)):
-        corner = {frame.x.key: x, frame.y.key: y}
-        if reason := obstacle(problem, corner, p):
-            raise case.refusal(f"with {assignments(corner)}: {reason}; choose another frame", "chart")
 
 
 def dear_lines(case: Case) -> Message | None:

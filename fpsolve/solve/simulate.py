@@ -16,7 +16,6 @@ from fpsolve.exponent.kinds import choose
 from fpsolve.messages import Code, Message
 from fpsolve.pool import processors
 from fpsolve.simulation.setup import PROGRESS_STEPS, obstacles, simulated_parts
-from fpsolve.solve.curve import SimulatedCurve
 from fpsolve.solve.question import idle
 from fpsolve.solve.records import key_of
 
@@ -58,15 +57,8 @@ def refuse_obstacles(case: Case) -> None:
             raise case.refusal(f"{place}{reason}", "monte_carlo", "p")
 
 
-def simulate_curve(
-    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = idle
-) -> SimulatedCurve:
-    """Simulate one curve, see `simulation_of`."""
-    return SimulatedCurve(curve, *simulation_of(curve, orders, setting, progress))
-
-
 def simulation_of(
-    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None]
+    curve: Curve, orders: Sequence[float], setting: MonteCarloSection, progress: Callable[[], None] = idle
 ) -> Simulation:
     """Simulate one curve, and with terms of degree 3 its stationary response; a task that pickles small.
 

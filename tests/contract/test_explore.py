@@ -167,7 +167,7 @@ SIDE = {"key": "noise.D0", "start": 0.1, "stop": 1.0, "scale": "log"}
 REFUSED = [
     # values, question, what is said
     ({"noise.D0": -1.0}, {}, r"^D0: got -1.0; must be .*>= .*noise intensity.*; write, for example"),
-    ({"noise.D0": ""}, {}, r'^D0: got "" .*must be a finite number'),
+    ({"noise.D0": ""}, {}, r'^D0: got ""; must be a finite number'),
     ({"noise.D0": float("nan")}, {}, "^D0: got nan; must be "),
     ({"nothing": 1.0}, {}, "must be values by their keys, which are noise.D0, "),
     ({"oscillator.epsilon": 900.0, "oscillator.restitution": 0.01}, {}, "overflow"),

@@ -86,7 +86,7 @@ def test_a_number_of_processors_that_is_none_is_refused(tmp_path, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("override", [[], 2.0, None])
+@pytest.mark.parametrize("override", [[], None])
 def test_an_override_that_is_no_text_is_refused(tmp_path, override):
     with pytest.raises(CaseError, match=r"is no text; write it as in --set oscillator\.omega=2\.0"):
         case_in(tmp_path, GOOD, [override])

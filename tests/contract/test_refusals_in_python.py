@@ -45,7 +45,7 @@ OU = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 ITO = White(s=1.0, interpretation="ito")
 SYSTEM = PlaneSystem([FREE])
 AXES = fpsolve.analysis.Axis("noise.alpha", 0.5, 2.0), fpsolve.analysis.Axis("noise.sigma", 0.5, 2.0)
-SIZE = "must be a finite number >= 1e-15 and <= 1e15"
+SIZE = "must be a finite number >= 1e-15 and <= 1e\\+15"
 OWN = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
 MODES = "q' = v; v' = -q - 0.1*v - xi*q - 0.3*y; y' = w; w' = -2*y - 0.2*w - 0.3*q"
 STOPPED = [{"at": "q = 0", "restitution": 0.6}]
@@ -147,8 +147,8 @@ BAD = [
         lambda: NonGaussianNoise(tau0=1.0, r0=0.9, DO=1.0),
         rf"D0: missing; {SIZE} .*\n.*DO: unknown; the parameters are D0, tau0, r0$",
     ),
-    (lambda: NonGaussianNoise(10**5000, 1.0, 0.9), "D0: got a value too long to show .*; must"),
-    (lambda: NonGaussianNoise(1.0, [0.5] * 99, 0.9), r"tau0: got \[(0\.5, ){11}0\.\.\. \(a list\); must"),
+    (lambda: NonGaussianNoise(10**5000, 1.0, 0.9), "D0: got a value too long to show; must"),
+    (lambda: NonGaussianNoise(1.0, [0.5] * 99, 0.9), r"tau0: got \[(0\.5, ){11}0\.\.\.; must"),
     (
         lambda: NonGaussianNoise(1.0, 1.0, 0.9, 2.0),
         "^NonGaussianNoise: argument 4: unknown; the parameters are D0, tau0, r0$",

@@ -16,13 +16,13 @@ from tests.faults import fuzz
 SHIPPED = sorted((Path(__file__).parents[2] / "cases").rglob("*.toml"))
 SAID = {
     "25000.mtx": "which has the shape (25000, 25000); must be a square matrix of finite numbers, of at most 100 rows",
-    "entries.mtx": "which states 4000000000 entries, more than the file holds",
+    "entries.mtx": "which cannot be read",
     "lies more.npy": "which has 1000000000000000000 numbers, and at most",
-    "wide.csv": "which has 3000000 columns",
+    "wide.csv": "which has the shape (1, 3000000)",
     "64 MB.csv": "which has 67108866 bytes, and a matrix has at most 67108864",
     "zeros.csv": "which is a pipe or a device, not a file",
     "empty lines": "has 20000005 bytes, and a case file has at most 4194304",
-    "keys": "faults; start from a copy of a case",
+    "keys": "and 950 more",
     "digits of Hz": "111 ... 111",
     "rate 1e160*x + xi*x": " in the motion; must be from 0 to 1e+32",
     "rate 1*x + 1*xi*x(t - 1e-300)": "got a delay of 1e-300 in the motion; must be from 1e-32 to 1e+32",
