@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
+from fractions import Fraction
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -156,3 +158,10 @@ def shortened(text: str, most: int = 60) -> str:
 def dense(matrix: Any) -> FloatArray:
     """An array of a matrix that may be sparse."""
     return matrix if isinstance(matrix, np.ndarray) else np.asarray(matrix.toarray())
+
+
+def bound_in_words(bound: float) -> str:
+    """5/3, and the float below it, as 5/3, not as 1.6666666666666667; 1e15 as it stands here."""
+    fraction = Fraction(bound).limit_denominator(99)
+    is_simple = fraction.denominator > 1 and math.isclose(fraction, bound, rel_tol=1e-15)
+    return str(fraction) if is_simple or isinstance(bound, int) else re.sub(r"e\+?(-?)0*", r"e\1", f"{bound:g}")

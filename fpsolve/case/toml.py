@@ -6,6 +6,7 @@ import re
 import tomllib
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
@@ -38,18 +39,21 @@ def dotted(path: Sequence[str | int]) -> str:
 
 
 class Scanner:
-    """Walks TOML that `tomllib` has accepted.
+    """Walks TOML that `tomllib` has accepted, or all that comes before its error.
 
     Attributes:
         lines: line of each dotted key, table and list entry.
         assigned: path of each `key = value` outside inline tables, in order.
+        repeated: the dotted key that is set twice first, and its second line; None where there is none.
     """
 
     def __init__(self, text: str) -> None:
         self.text, self.at = text, 0
         self.lines: dict[str, int] = {}
         self.assigned: list[Keys] = []
+        self.repeated: tuple[str, int] | None = None
         self._newlines = [match.start() for match in re.finditer("\n", text)]
+        self._explicit: set[str] = set()
         self._entries: dict[Keys, int] = {}  # the last one of each list of tables
 
     def scan(self) -> Scanner:
@@ -83,7 +87,11 @@ class Scanner:
             if (table := dotted(path[:end])) in self.lines:  # and so are all around it
                 break
             self.lines[table] = line
-        self.lines[key] = line
+        if key not in self._explicit:
+            self._explicit.add(key)
+            self.lines[key] = line
+        elif self.repeated is None:
+            self.repeated = key, line
 
     def _key(self) -> list[str]:
         parts: list[str] = []
@@ -234,9 +242,15 @@ def _syntax_fault(text: str, message: str) -> Fault:
     """tomllib's own message with its line; for a key that is set twice, which one and where."""
     where = re.search(r" \(at (?:line (\d+), column \d+|end of document)\)", message)
     line = int(where[1]) if where and where[1] else text.count("\n") + 1 if where else None
-    shown = "".join(text.splitlines()[line - 1 : line]).strip() if line else ""
     if re.search("overwrite|twice|[Dd]uplicate", message):
-        return Fault("", line, f"sets a key twice: {shown}; remove one of the two lines")
+        scanner = Scanner(text)
+        with suppress(ValueError, RecursionError):
+            scanner.scan()
+        if scanner.repeated:
+            key, second = scanner.repeated
+            first, key = scanner.lines[key], re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", key)
+            return Fault(key, second, f"set twice, first on line {first}; remove one of them")
+    shown = "".join(text.splitlines()[line - 1 : line]).strip() if line else ""
     return Fault("", line, f"not valid TOML: {message}; {_syntax_remedy(shown)}")
 
 
@@ -251,4 +265,6 @@ def _syntax_remedy(line: str) -> str:
         return f"write the number alone, without a unit: {line}{without_unit(value)}"
     if re.fullmatch(r"[A-Za-z][\w./-]*", value):
         return f'write a text in quotes, as in {key} = "{value}"'
-    return f"correct the syntax, see https://toml.io{': ' + line if line else ''}"
+    if line and (slip := re.search(r",\s*,", line) or re.search(r"[\]\"'\d]\s*,\s*$", value)):
+        return f"remove the comma at {slip.group().strip()!r}: {line}"
+    return f"correct the syntax{' of: ' + line if line else ''}, see https://toml.io"

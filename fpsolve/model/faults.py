@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass, is_pydantic_dataclass
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from fpsolve.arrays import shortened
+from fpsolve.arrays import bound_in_words, shortened
 from fpsolve.model.parameters import STRICT, Parametrised, example_of, meaning_of, without_unit
 
 Kind = TypeVar("Kind")
@@ -145,7 +145,7 @@ def guess(name: str, known: Iterable[str]) -> str | None:
 
 def accepted(field: FieldInfo) -> str:
     """The range of a key, read off its field: "a finite number > 0 and <= 1"."""
-    bounds = " and ".join(f"{_SIGNS[name]} {bound:.15g}" for name, bound in bounds_in(field).items())
+    bounds = " and ".join(f"{_SIGNS[name]} {bound_in_words(bound)}" for name, bound in bounds_in(field).items())
     return f"{_noun(field.annotation)} {bounds}".rstrip()
 
 

@@ -12,7 +12,6 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from statistics import median
 
 import numpy as np
 import pytest
@@ -417,32 +416,3 @@ def test_click_on_the_map_sets_the_sliders_and_paths_grow_with_the_exponent(brow
     assert abs(np.mean(rates) - found["exponent"]) < 5 * np.std(rates) / 3
     assert len(found["logs"]) == 10
     assert min(found["motion"]) >= 0  # the wall is at 0
-
-
-MOVES = """
-async count => {
-  const slider = document.querySelectorAll("input[type=range]")[2], svg = document.querySelector("#curve svg");
-  const path = () => svg.querySelector("path.one.line")?.getAttribute("d");
-  const times = [];
-  for (let k = 0; k < count; k++) {
-    const before = path(), start = performance.now();
-    slider.value = 200 + 10 * k;
-    slider.dispatchEvent(new Event("input"));
-    await new Promise(done => new MutationObserver((_, watch) => {
-      if (path() && path() !== before) { watch.disconnect(); done(); }
-    }).observe(svg, {childList: true, subtree: true}));
-    await new Promise(requestAnimationFrame);
-    times.push(performance.now() - start);
-    while (isMoving) await new Promise(done => setTimeout(done, 1));
-  }
-  return times;
-}
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "most", "count"), [("fig1", 500, 9), ("strong", 2000, 3)])
-def test_curve_follows_a_slider_at_once(browser, name, most, count):
-    with explored(browser, name) as page:
-        times = page.evaluate(MOVES, count)
-    assert median(times) < most, times  # a tenth of it where nothing else runs

@@ -45,7 +45,7 @@ OU = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 ITO = White(s=1.0, interpretation="ito")
 SYSTEM = PlaneSystem([FREE])
 AXES = fpsolve.analysis.Axis("noise.alpha", 0.5, 2.0), fpsolve.analysis.Axis("noise.sigma", 0.5, 2.0)
-SIZE = "must be a finite number >= 1e-15 and <= 1e\\+15"
+SIZE = "must be a finite number >= 1e-15 and <= 1e15"
 OWN = {"omega": 1.0, "restitution": 0.8, "c1": 0.1, "epsilon": 0.1}
 MODES = "q' = v; v' = -q - 0.1*v - xi*q - 0.3*y; y' = w; w' = -2*y - 0.2*w - 0.3*q"
 STOPPED = [{"at": "q = 0", "restitution": 0.6}]

@@ -5,7 +5,6 @@ import pickle
 import re
 import resource
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -86,29 +85,6 @@ def test_more_processes_than_can_be_started_are_refused(case):
     _, said = process.communicate(timeout=120)
     assert process.returncode == 2
     assert re.search("cannot be started: .*; use fewer jobs\n$", said), said
-
-
-@pytest.mark.slow
-def test_page_waits_where_files_run_out_and_answers_once_there_are_some():
-    process = started(RUN, "explore", str(EXPLORED), "--no-open")
-    try:
-        assert process.stdout.readline() == "begun\n"
-        port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stdout.readline())[1])
-        before = resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
-        resource.prlimit(process.pid, resource.RLIMIT_NOFILE, (3, before[1]))
-        stat = Path(f"/proc/{process.pid}/stat")
-        with socket.create_connection(("127.0.0.1", port), timeout=60) as connection:
-            time.sleep(0.2)
-            ticks = [sum(map(int, stat.read_text().rpartition(")")[2].split()[11:13]))]
-            time.sleep(1)
-            ticks.append(sum(map(int, stat.read_text().rpartition(")")[2].split()[11:13])))
-            assert ticks[1] - ticks[0] < 0.3 * os.sysconf("SC_CLK_TCK")
-            resource.prlimit(process.pid, resource.RLIMIT_NOFILE, before)
-            connection.sendall(f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
-            assert connection.recv(100).startswith(b"HTTP/1.1 200")
-    finally:
-        process.kill()
-        process.communicate()
 
 
 @pytest.mark.slow
