@@ -124,8 +124,11 @@ def _index(found: IndexEnclosure) -> IndexBound:
     return IndexBound(lower=lower, upper=upper, moments=[moment_of(p, each) for p, each in found.moments])
 
 
+ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)]
+
+
 def prove(
-    cases: Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)] = None,
+    cases: ProvenCases = None,
     *,
     width: float | None = None,
     check: Path | None = None,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 from collections.abc import Iterable, Mapping
 from glob import glob
 from pathlib import Path
@@ -97,7 +98,11 @@ def open_results(*places: str | Path) -> xr.Dataset:
     """
     import xarray as xr  # 430 ms, with pandas
 
-    there = [Path(path) for place in places for path in sorted(glob(str(place))) or [str(place)]]  # noqa: PTH207
+    there = [
+        path
+        for place in map(str, places)
+        for path in map(Path, [place] if os.path.exists(place) else sorted(glob(place)))  # noqa: PTH110, PTH207
+    ]
     files = [path / RESULTS if path.is_dir() else path for path in there]
     runs, count = list[xr.Dataset](), 0
     for path in files:

@@ -192,12 +192,12 @@ def _z_lines(pair: PrincipalPair) -> FloatArray:
         return xi.lines
     end = noise.half_width / noise.standard_deviation
     reach = min(end, 12.0 + abs(xi.center))
-    z = np.linspace(-reach, reach, 2001)
-    inside = z[1:-1]
-    tilted, stationary = np.abs(xi_marginal(pair, xi.at(inside))), noise.density(noise.standard_deviation * inside)
-    seen = np.flatnonzero((tilted > FAINT * tilted.max()) | (stationary > FAINT * stationary.max()))
-    lower, upper = z[seen[0]], z[seen[-1] + 2]
-    return np.linspace(lower, upper, math.ceil(upper - lower) + 1)
+    z = np.linspace(-reach, reach, 2001)[1:-1]
+    tilted, stationary = np.abs(xi_marginal(pair, xi.at(z))), noise.density(noise.standard_deviation * z)
+    seen = z[(tilted > FAINT * tilted.max()) | (stationary > FAINT * stationary.max())]
+    lower, upper = max(math.floor(seen[0]), -end), min(math.ceil(seen[-1]), end)
+    inside = np.arange(math.floor(lower) + 1, math.ceil(upper))
+    return np.concatenate([[lower], inside[(inside > lower + 0.1) & (inside < upper - 0.1)], [upper]])
 
 
 def _parts(degree: int, order: int) -> int:
