@@ -15,6 +15,7 @@ import numpy as np
 
 from fpsolve.arrays import require
 from fpsolve.case.case import Case, load_case
+from fpsolve.case.sections import RESPONSE
 from fpsolve.commands.options import kept, of_curves, saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
@@ -185,7 +186,7 @@ class Sweep:
         """Write all tables, the series over the curves, and the files of what records hold."""
         self._write(TABLES)
         write_curves(self.case, self.folder)
-        for result in self.results:
+        for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
                 write_response(result.response, result.curve, self.folder)
 
@@ -293,7 +294,7 @@ def run_case(
             sweep = Sweep(case, folder, is_fresh=is_fresh)
         sweep.run(pool, watch)
         results, simulated = sweep.results, simulations.simulated
-        said = [*notes(case, results, count=len(results))]
+        said = [*notes(case, results.telling, count=len(results))]
 
         def finish() -> None:
             with watch.bar(Phase(case.name, "figures")), writable(folder):

@@ -120,6 +120,11 @@ class Results(Sequence[CurveResult]):
         """Those of the curves of which anything is known."""
         return (1 + np.flatnonzero(np.isfinite(self.table[STATUS.name].values))).tolist()
 
+    @property
+    def telling(self) -> Iterator[CurveResult]:
+        """Those of which something is said."""
+        return (self.of(number) for number in self.numbers if self.table.messages[number - 1])
+
     def of(self, number: int) -> CurveResult:
         """That of the curve with a number."""
         return result_of(self.job(number, is_all=True))

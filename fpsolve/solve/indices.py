@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from fpsolve.case.case import Case, Curve
 from fpsolve.errors import NoSuchExponent
@@ -47,11 +47,21 @@ def question_of(index: Index) -> Question:
         if index.name not in case.asked:
             return {}
         found = result.estimates[index.name] if result else None
-        theory = index.theory(result.curve.problem) if result and found else None
-        return {**estimated(index, found), by_theory: theory}
+        theory: Mapping[str, float] = result.parts.get(THEORY.name, {}) if result and found else {}
+        return {**estimated(index, found), by_theory: theory.get(index.name)}
 
     return Question(index.name, asked, solve, Estimate, index.symbol, said=said, numbers=numbers)
 
 
 INDEX_QUESTIONS: tuple[Question, ...] = tuple(map(question_of, INDICES.values()))
 """One for each index."""
+
+
+def _solve_theory(job: Job, settings: Settings) -> dict[str, float]:
+    return {name: index.theory(job.curve.problem) for name, index in INDICES.items()}
+
+
+THEORY: Question = Question(
+    "theory", lambda case, _: None if INDICES.keys().isdisjoint(case.asked) else {}, _solve_theory, dict[str, float]
+)
+"""The indices by perturbation theory, which a record has so that tables need not make the problem of each curve."""

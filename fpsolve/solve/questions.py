@@ -12,6 +12,7 @@ QUESTIONS: tuple[Question, ...] = (
     moments.QUESTION,
     moments.RATES,
     *indices.INDEX_QUESTIONS,
+    indices.THEORY,
     moments.CLASSES,
     *(import_module(f"fpsolve.solve.{name}").QUESTION for name in PARTS),
     intervals.QUESTION,

@@ -59,13 +59,19 @@ def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[B
     yield curve_grid(case, results, table)
     if len(results) <= EACH:
         return
-    counts = Counter(result.status for result in results)
+    counts = Counter(_states(table))
     failed, whole = sum(count for each, count in counts.items() if each.fails), counts[Status.CONVERGED]
     kinds = {"converged": whole, "with warnings": counts.total() - whole - failed, "not converged": failed}
     states = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
     is_short = len(results) > ROWS and failed > FAILURES
     shown = f"; of those that are not converged the first {FAILURES} are shown" if is_short else ""
     yield Sentence(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
+
+
+def _states(table: Table) -> list[Status]:
+    """Of all curves of which anything is known."""
+    values = table[STATUS.name].values
+    return [Status(int(each)) for each in values[~np.isnan(values)].tolist()]
 
 
 def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid:
@@ -80,7 +86,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
     for p in _told_moments(case):
         numbers[moment_at(p).symbol] = table[MOMENT.name].values[:, np.flatnonzero(case.p == p)[0]]
     extreme = {symbol: numbers[symbol][known] for symbol in [*numbers][:EXTREMES]}
-    failed = [place for place, result in enumerate(results) if result.status.fails]
+    failed = [place for place, each in enumerate(_states(table)) if each.fails]
     has_status = any(status[known])
 
     def cells(result: CurveResult) -> Cells:

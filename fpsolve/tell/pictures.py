@@ -14,6 +14,7 @@ import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
 from fpsolve.case.case import Case, Curve
+from fpsolve.case.sections import RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity
 from fpsolve.drawing import MOST_LINES, QUARTERS, Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes
 from fpsolve.exponent.density import Grid, direction_grid, on_nodes
@@ -262,5 +263,7 @@ def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
+DRAWN = RESPONSE, SENSITIVITIES, PHASE_AND_NOISE.part, DIRECTIONS.part
+"""The questions of which the figures of a curve are."""
 FIGURES = _of_response, _of_sensitivities, _of_eigenfunctions, _of_directions
 """Of a curve in a folder, beside its simulation if there is one."""

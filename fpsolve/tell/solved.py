@@ -9,11 +9,12 @@ from pathlib import Path
 from fpsolve.case.case import Case
 from fpsolve.results.table import Table
 from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.solve.sets import everything
 from fpsolve.tell import curves
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
 from fpsolve.tell.numbers import excursions, indices, meaning, moment_grid, response, verdicts
-from fpsolve.tell.pictures import FIGURES
+from fpsolve.tell.pictures import DRAWN, FIGURES
 from fpsolve.tell.text import EACH, PICTURES, ROWS_OVER_P, duration, plural
 
 
@@ -72,7 +73,8 @@ def write_figures(
     main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
-    for result in results:
+    of_each = any(each in everything(case, 2) for each in DRAWN)
+    for result in results if of_each else results[:1]:
         for figure in figures_of(case, result, folder, samples.get(result.curve.number)):
             figure.write(folder)
 
