@@ -378,7 +378,10 @@ class Case(Section):
     @cached_property
     def theory_reduces_noise(self) -> bool:
         """Whether perturbation theory takes the reduction in place of the noise of some curve."""
-        return any(each.is_possible and each.noise.approximates_spectrum for each in self.curves())
+        texts = [key for key in self.vary.keys if self.vary.is_text(key)]
+        words = {tuple(map(each.__getitem__, texts)) for each in self.vary.sets}
+        kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
+        return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
 
     def heading(self, curve: Curve) -> str:
         """The headline, with which of the curves."""

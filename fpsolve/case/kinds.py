@@ -67,11 +67,12 @@ def names_of(table: Any) -> list[str]:
 
 def _misnamed(names: list[str], sections: Sequence[str]) -> Iterator[Refusal]:
     """Noises that are not those of the system, of which one has the section "noise" and no name."""
-    if {*names} != {section.partition(".")[2] for section in sections} - {""}:
+    wanted = {section.partition(".")[2] for section in sections} - {""}
+    if {*names} != wanted:
         stated = " and ".join(f"[{section}]" for section in sections)
         found = " and ".join(f"[noise.{name}]" for name in names) or "[noise] alone"
         text = f"must be {stated} for this system, but is {found}; rename it, or name others in noises of [system]"
-        yield (), text
+        yield tuple(name for name in names if name not in wanted)[:1], text
 
 
 def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:

@@ -234,7 +234,9 @@ def _modes(stated: Statement, case: Case | None) -> Modes:
     [option] = told
     omega = found[option]
     if len(omega) > 2:
-        raise FpsolveError(f"{option} has {len(omega)} modes; choose one or two by --mode, or as many --frequency")
+        raise FpsolveError(
+            f"{stated.modes or option} has {len(omega)} modes; choose one or two by --mode, or as many --frequency"
+        )
     known = zeta if zeta is not None else table[0].damping_ratio if table else math.nan
     return Modes(tuple(omega), known, stated.restitution)
 

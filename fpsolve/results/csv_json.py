@@ -70,9 +70,7 @@ def write_numbers(results: Results, path: Path, facts: Content) -> None:
 
 def write_summary(results: Results, path: Path, facts: Content) -> None:
     """Write all that is known of all sets, unless there are many."""
-    if results.case.planned > MOST_SUMMARISED:
-        path.unlink(missing_ok=True)
-    else:
+    if results.case.planned <= MOST_SUMMARISED:
         write_json(path, summary(results, facts))
 
 

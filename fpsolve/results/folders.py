@@ -39,8 +39,8 @@ def own_folder(
         case: whose parameters count; those of no case are always the same.
 
     Raises:
-        OutputError: the folder cannot be made or written to, another run writes into it, or something in it has the
-            name of what will be written and cannot be replaced; nothing is removed.
+        OutputError: the folder cannot be made or written to, another run writes into it, or a folder is
+            where a file is that the commands wrote; nothing is removed.
     """
     sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns]) if case else ""
     digest = sha256(sets.encode()).hexdigest()

