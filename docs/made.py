@@ -89,7 +89,7 @@ def script(path: Path) -> str:
     few = case.figure.x == "p" and case.moments.values.size < 8 and not own
     sets = [] if own else ["output={ quantities = ['moment', 'lyapunov_exponent', 'stability_index'] }"]
     if few:
-        names = "['moment', 'response']" if case.has_response else "['moment']"
+        names = "['moment', 'response']" if "response" in case.asked else "['moment']"
         sets = [f"output={{ quantities = {names} }}", "expect=[]", "figure={}"]
         count, digits = (7, ", rtol = 1e-4") if path.stem in TWO_AXES else (13, "")
         sets += [f"moments={{ p = {{ start = 0.0, stop = 3.0, num = {count} }}{digits} }}"]
@@ -97,7 +97,7 @@ def script(path: Path) -> str:
     head = f'"""\n{title}\n{"=" * len(title)}\n\n{_rst(words)}\n"""\n\n'
     shown = f"# %%\n# The case file:\n#\n# .. literalinclude:: /generated/cases/{path.name}\n#    :language: toml\n"
     shown_there = "The figure of the case" if not few else "Λ(p) over a range of p"
-    shown_there += ", and the stationary response" if case.has_response else ""
+    shown_there += ", and the stationary response" if "response" in case.asked else ""
     run = f"""
 # %%
 # {shown_there}:
