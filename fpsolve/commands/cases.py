@@ -30,14 +30,14 @@ from fpsolve.results.known import Results, record_of
 from fpsolve.results.simulate import SIMULATION, write_response
 from fpsolve.results.table import COUNTS
 from fpsolve.solve.curve import CurveResult, Status
-from fpsolve.solve.question import Job, refuse_mesh
+from fpsolve.solve.question import Job, idle, refuse_mesh
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records
 from fpsolve.solve.sets import solve_set
 from fpsolve.solve.simulate import refuse_obstacles
 from fpsolve.tell import solved as told
 from fpsolve.tell.notes import MONTE_CARLO, notes
-from fpsolve.tell.progress import MOMENTS, SETS, SILENT, Advance, Phase, Watch, ignore
+from fpsolve.tell.progress import MOMENTS, SETS, SILENT, Advance, Phase, Watch
 from fpsolve.tell.reports import shown_at_the_end, write_report
 from fpsolve.tell.simulate import show as show_simulated
 
@@ -258,7 +258,7 @@ def run(
         for _ in range(count):
             progress()
 
-    watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else ignore))
+    watch = Watch(bar=lambda phase: nullcontext(advance if phase.unit else idle))
     results = tuple(run_case(read, out, pool=pool, is_fresh=fresh, watch=watch).sweep.results)
     if reasons := tuple(failure.reason for each in results for failure in each.failures):
         raise NotConverged(Message(Code.SEVERAL, reasons=reasons), results)

@@ -15,7 +15,7 @@ CHECK_FAILED, BAD_INPUT, NOT_CONVERGED = 1, 2, 3
 
 
 def print_error(text: str) -> None:
-    """Print what is wrong on the standard error, in the words of case files."""
+    """Print what is wrong on the standard error."""
     try:
         Console(stderr=True).print(Text(escaped(message_of(text))), style="bold red", soft_wrap=True)
     except (OSError, SystemExit):  # there is no place left to say it

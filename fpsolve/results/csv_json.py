@@ -76,7 +76,7 @@ def write_summary(results: Results, path: Path, facts: Content) -> None:
 
 Writer = Callable[[Results, Path, Content], None]
 GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_numbers, "moments.csv": write_moments}
-"""What writes each of the files with numbers of all sets while a run grows; the first says whether all are there."""
+"""What writes each of the files with numbers of all sets while a run grows."""
 TABLES: dict[str, Writer] = GROWING | {"results.nc": write_dataset}
 """What writes all files with numbers of all sets at the end, and takes the `facts_of` the run."""
 

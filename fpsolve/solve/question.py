@@ -155,7 +155,7 @@ def fault(failure: Exception) -> Message:
     return Message(Code.FAULT, **said, file=Path(last.filename).name, line=last.lineno)
 
 
-def idle(*_: object) -> None:
+def idle(*_: object, **__: object) -> None:
     """What is called where nobody wants to know."""
 
 

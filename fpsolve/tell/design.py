@@ -10,7 +10,7 @@ from fpsolve.exponent.error import digits
 from fpsolve.solve.design import DesignOutcome
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
 from fpsolve.tell.notes import note_on
-from fpsolve.tell.text import plural
+from fpsolve.tell.text import error_text, plural
 
 
 def show(case: Case, outcome: DesignOutcome) -> Iterator[Block]:
@@ -24,13 +24,13 @@ def show(case: Case, outcome: DesignOutcome) -> Iterator[Block]:
     grid = Grid(case.headline, columns)
     for key, name in zip(keys, short_names(keys), strict=True):
         value = found.values[key]
-        numbers = digits(value.value, value.error_estimate), f"{value.error_estimate:.0e}"
+        numbers = digits(value.value, value.error_estimate), error_text(value)
         grid.rows.append([name, f"{found.start.values[key]:.10g}", *numbers, case.about(key).unit_in_words])
     yield grid
     symbol, value = outcome.target.quantity.symbol, found.found
     met = digits(value.value, value.error_estimate)
     solves = f"{found.solves} {plural('solve', found.solves)}"
-    yield Sentence(f"{symbol} = {met} ± {value.error_estimate:.0e}; wanted {outcome.target.value:.10g}; {solves}")
+    yield Sentence(f"{symbol} = {met} ± {error_text(value)}; wanted {outcome.target.value:.10g}; {solves}")
     if len(keys) > 1:
         measures = ", ".join(f"{key} / {outcome.units[key]:.6g}" for key in keys)
         told = f"the square root of the sum of the squares of the changes of {measures}"

@@ -263,7 +263,10 @@ def _draw_lines(axes: Axes, nodes: Nodes, values: FloatArray, *, is_log: bool) -
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
-DRAWN = RESPONSE, SENSITIVITIES, PHASE_AND_NOISE.part, DIRECTIONS.part
-"""The questions of which the figures of a curve are."""
-FIGURES = _of_response, _of_sensitivities, _of_eigenfunctions, _of_directions
-"""Of a curve in a folder, beside its simulation if there is one."""
+FIGURES = {
+    RESPONSE: _of_response,
+    SENSITIVITIES: _of_sensitivities,
+    PHASE_AND_NOISE.part: _of_eigenfunctions,
+    DIRECTIONS.part: _of_directions,
+}
+"""Of a curve in a folder, beside its simulation if there is one, by the names of the questions they answer."""

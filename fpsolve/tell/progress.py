@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from fpsolve.budget import Meter, watched
+from fpsolve.solve.question import idle
 from fpsolve.tell.blocks import Block
 
 SETS, MOMENTS, NODES, POINTS, BOUNDS, PERCENT, SOLVES = "sets", "p", "nodes", "points", "bounds", "%", "solves"
@@ -45,10 +46,6 @@ Advance = Callable[..., None]
 """What a phase calls as it goes on: with how many steps are done, `failed` of them, `known` if by an earlier run."""
 
 
-def ignore(*_: object, **__: object) -> None:
-    """Progress that is not shown."""
-
-
 @dataclass(frozen=True)
 class Watch:
     """What is shown of the work on a case; by default nothing.
@@ -62,7 +59,7 @@ class Watch:
         is_whole: whether a few of several curves are also shown one by one, with Λ at each p.
     """
 
-    bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(ignore)
+    bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(idle)
     shown: Callable[[Iterable[Block]], None] = lambda _: None
     noted: Callable[[Iterable[Block]], None] = lambda _: None
     said: Callable[[Iterable[Block]], None] = lambda _: None

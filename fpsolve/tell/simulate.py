@@ -61,10 +61,10 @@ def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[Curv
     for each in simulated if is_short else ():
         result = solved.get(each.curve.number)
         yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
-        found, unit = each.result, case.units.time
+        found = each.result
         if result is None:
             value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
-            meaning = fate("almost every path", value, sign_of(value, SURE * error), unit)
+            meaning = fate("almost every path", value, sign_of(value, SURE * error), case.units.time)
             yield Sentence(f"λ = {sampled(value, error)} ± {error:.1e}: {meaning}.")
         if over_p:
             yield moment_grid(case, each, result)

@@ -14,7 +14,7 @@ from fpsolve.tell import curves
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
 from fpsolve.tell.numbers import excursions, indices, meaning, moment_grid, response, verdicts
-from fpsolve.tell.pictures import DRAWN, FIGURES
+from fpsolve.tell.pictures import FIGURES
 from fpsolve.tell.text import EACH, PICTURES, ROWS_OVER_P, duration, plural
 
 
@@ -63,7 +63,7 @@ def _has_grid(case: Case, result: CurveResult, *, is_whole: bool) -> bool:
 
 def figures_of(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
     """The figures of a curve, beside its simulation."""
-    return chain.from_iterable(draw(case, result, folder, simulated) for draw in FIGURES)
+    return chain.from_iterable(draw(case, result, folder, simulated) for draw in FIGURES.values())
 
 
 def write_figures(
@@ -73,7 +73,7 @@ def write_figures(
     main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
     samples = {each.curve.number: each for each in simulated}
-    of_each = any(each in everything(case, 2) for each in DRAWN)
+    of_each = FIGURES.keys() & everything(case, 2)
     for result in results if of_each else results[:1]:
         for figure in figures_of(case, result, folder, samples.get(result.curve.number)):
             figure.write(folder)
