@@ -20,20 +20,13 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # one worker for each processor: more t
 import numpy as np
 import pytest
 
-from fpsolve.exponent.solver import ExponentSolver
 from fpsolve.model.noises.non_gaussian import NonGaussianNoise
 from fpsolve.model.noises.ornstein_uhlenbeck import OrnsteinUhlenbeck
-from fpsolve.model.problem import Problem
 from fpsolve.model.systems.vibro_impact import VibroImpactOscillator
 
 FIG1 = VibroImpactOscillator(omega=1.0, restitution=0.8, c1=0.1, epsilon=0.1)
 FIG1_NOISE = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
 UNIT_NOISE = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
-
-
-@pytest.fixture(scope="session")
-def fig1_solver() -> ExponentSolver:
-    return ExponentSolver(Problem(FIG1, FIG1_NOISE.ou_reduction()))
 
 
 @functools.cache
@@ -88,7 +81,7 @@ def rng() -> np.random.Generator:
 def keeping(first, second, sizes=(0.7, -0.6)):
     """The matrix of a noise that moves the phase over neither of two rays: they are those of its eigenvectors."""
     rays = np.array([[np.cos(first), np.cos(second)], [-np.sin(first), -np.sin(second)]])
-    return (rays @ np.diag(sizes) @ np.linalg.inv(rays)).tolist()
+    return rays @ np.diag(sizes) @ np.linalg.inv(rays)
 
 
 gc.disable()  # what is collected stays, so that looking through it again finds nothing
@@ -116,15 +109,3 @@ def started(code: str, *words: str, before: Callable[[], object] = heed_signals,
     """A process of its own that runs code with these words; it heeds signals, whatever the parent does."""
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **more}
     return subprocess.Popen([sys.executable, "-c", code, *words], **pipes, text=True, preexec_fn=before)
-
-
-def oracle_arguments(oscillator: VibroImpactOscillator, noise: OrnsteinUhlenbeck) -> dict[str, float]:
-    """Plain numbers for the reference codes in tests/oracles."""
-    return {
-        "alpha": noise.alpha,
-        "sigma": noise.sigma,
-        "omega": oscillator.omega,
-        "epsilon": oscillator.epsilon,
-        "c1": oscillator.c1,
-        "log_R": oscillator.log_impact_factor,
-    }

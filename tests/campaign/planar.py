@@ -286,14 +286,7 @@ def paper(count: int, seed: int = 2026) -> list[tuple[VibroImpactOscillator, Noi
 
 def of_paper(system: VibroImpactOscillator, noise: Noise, p: float) -> tuple[Drawn, float]:
     """A problem of the paper for both methods, and p."""
-    law = (
-        planar.between_ends(noise.D0, noise.tau0, noise.r0)
-        if isinstance(noise, NonGaussianNoise)
-        else planar.ornstein_uhlenbeck(noise.alpha, noise.standard_deviation)
-    )
-    drift = np.array([[0.0, system.omega], [-system.omega, system.epsilon**2 * system.c1]])
-    known = planar.Planar(drift, ((np.diag([0.0, system.epsilon]), law),), log_factor=system.log_impact_factor)
-    return Drawn(noise.kind, Problem(system, noise), known, 1), p
+    return Drawn(noise.kind, Problem(system, noise), planar.of_paper(system, noise), 1), p
 
 
 def numbers_of_paper(seed: int) -> Iterator[Number]:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.hermite_e import hermegauss, hermeval
 from scipy.optimize import brentq
 
 from fpsolve import OrnsteinUhlenbeck, Problem
@@ -16,7 +15,7 @@ from fpsolve.exponent import even_moment
 from fpsolve.model import Bounded, Filter, MarkovChain, Noise, Poisson, SineWiener, Telegraph, White
 from tests.campaign.numbers import UNKNOWN, Number, asked, beside, between, elements, paths_of
 from tests.kit import matrices, rates
-from tests.oracles import filtered, kronecker
+from tests.numbers.second import even, with_segment
 from tests.oracles.segments import Segment, written
 
 KINDS = ("white", "ornstein-uhlenbeck", "telegraph", "filter")
@@ -173,25 +172,27 @@ PADDED = 46
 """Variables whose second moments are taken as matrices, under any noise."""
 
 
-def _with_oracle(kind: str, rng: np.random.Generator, size: float) -> tuple[Noise, Callable]:
-    """A noise of about this size, and what the oracle takes of it: its rates and ξ for some functions."""
+def _cycle(size: float, rng: np.random.Generator) -> MarkovChain:
+    """A chain that is not reversible."""
+    jumps = rng.uniform(0.1, 1.5, (3, 3)) + np.array([[0, 2, 0], [0, 0, 2], [2, 0, 0]])
+    np.fill_diagonal(jumps, 0.0)
+    return MarkovChain(size * rng.uniform(-1.5, 1.5, 3), jumps)
+
+
+def _coloured(kind: str, rng: np.random.Generator, size: float) -> Noise:
+    """A noise of about this size."""
     rate = math.exp(rng.uniform(-0.5, 1.0))
     match kind:
         case "gaussian":
-            noise = OrnsteinUhlenbeck(alpha=rate, sigma=size * math.sqrt(2 * rate))
-            return noise, lambda count: kronecker.gaussian(rate, size, count)
-        case "chain":  # one that is not reversible
-            jumps = rng.uniform(0.1, 1.5, (3, 3)) + np.array([[0, 2, 0], [0, 0, 2], [2, 0, 0]])
-            states = size * rng.uniform(-1.5, 1.5, 3)
-            np.fill_diagonal(jumps, 0.0)
-            return MarkovChain(states, jumps), lambda _: kronecker.jumping(states, jumps)
+            return OrnsteinUhlenbeck(alpha=rate, sigma=size * math.sqrt(2 * rate))
+        case "chain":
+            return _cycle(size, rng)
         case "sine-wiener":
-            return SineWiener(1.4 * size, rate), lambda count: kronecker.turning(1.4 * size, 0.0, rate, count, True)
+            return SineWiener(1.4 * size, rate)
         case "bounded":
-            return Bounded(1.4 * size, 2.0, rate), lambda count: kronecker.turning(1.4 * size, 2.0, rate, count, False)
+            return Bounded(1.4 * size, 2.0, rate)
     omega, zeta, outputs = 1.5 * rate, 1.0 if rng.uniform() < 0.3 else rng.uniform(0.1, 1.5), rng.uniform(-1, 1, 2)
-    law = omega, zeta, filtered.strength(omega, zeta, *outputs, size), *outputs
-    return Filter(*map(float, law)), lambda count: kronecker.filtering(law, count)
+    return Filter(omega, zeta, size / Filter(omega, zeta, 1.0, *outputs).standard_deviation, *map(float, outputs))
 
 
 def many(seed: int, *, is_padded: bool = False) -> tuple[Problem, Callable[[int, float], float]]:
@@ -213,21 +214,17 @@ def many(seed: int, *, is_padded: bool = False) -> tuple[Problem, Callable[[int,
     if seed % 4 == 0:
         load = np.outer(load[0], load[1]) * math.sqrt(n)
     size, strong = np.exp(rng.uniform((-3.0, -3.0), (0.0, 0.0)))
-    white, coloured, impulses, loads = [], [], [], [load]
     if kind in ("white", "ito"):
-        noises: list[Noise] = [White(s=size, interpretation="ito" if kind == "ito" else "stratonovich")]
-        white = [(size * load, "ito" if kind == "ito" else "stratonovich")]
+        noise: Noise = White(s=size, interpretation="ito" if kind == "ito" else "stratonovich")
     elif kind == "poisson":
-        noises, impulses = [Poisson(1.5, (-size, 0.5 * size))], [(0.75, -size * load), (0.75, 0.5 * size * load)]
+        noise = Poisson(1.5, (-size, 0.5 * size))
     else:
-        noise, of_own = _with_oracle(("chain" if n > 6 else "gaussian") if kind == "both" else kind, rng, size)
-        noises, coloured = [noise], [(load, of_own)]
-    if kind == "both":
-        noises, white, loads = [*noises, White(s=strong)], [(strong * other, "stratonovich")], [load, other]
+        noise = _coloured(("chain" if n > 6 else "gaussian") if kind == "both" else kind, rng, size)
+    driven = [(load, noise), (other, White(s=strong))][: 1 + (kind == "both")]
+    loads, noises = map(list, zip(*driven, strict=True))
 
     def oracle(p: int, near: float) -> float:
-        own = [(matrix, *of_own(COUNTS.get(kind, 30) if n < 9 else 30)) for matrix, of_own in coloured]
-        return kronecker.several(free, own, white, impulses, p, near)
+        return even(p, free, *driven, count=COUNTS.get(kind, 30) if n < 9 else 30, near=near)
 
     if is_padded:
         more = PADDED - n
@@ -248,16 +245,6 @@ def numbers_of_many(seed: int, p: int = 2) -> Iterator[Number]:
 
 
 DELAYED = "white", "two white", "stratonovich", "gaussian", "chain", "chain and white"
-POINTS = 14
-"""Values that stand for Gaussian noise."""
-
-
-def _gaussian(alpha: float, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Values of Gaussian noise at the points of a rule, and the generator on functions through these."""
-    z, weights = hermegauss(POINTS)
-    weights /= weights.sum()
-    table = np.array([hermeval(z, np.eye(POINTS)[k]) / math.sqrt(math.factorial(k)) for k in range(POINTS)])
-    return size * z, -alpha * (table.T * np.arange(POINTS)) @ table * weights
 
 
 def delayed(seed: int) -> tuple[Problem, Callable[[int], Segment]]:
@@ -274,28 +261,13 @@ def delayed(seed: int) -> tuple[Problem, Callable[[int], Segment]]:
     size = math.exp(rng.uniform(-1.5, 0.0))
     drift, load, other = terms(1.0), terms(size), terms(size)
     drift[0] = 0.0, drift[0][1] - rng.uniform(0.5, 2.0) * np.eye(n)
-    states, jumps, still, white, coloured = np.zeros(1), np.zeros((1, 1)), drift, [load], []
     noises: list[Noise] = [White(s=1.0, interpretation="stratonovich" if kind == "stratonovich" else "ito")]
-    if kind == "stratonovich":  # A + ½α², B + ½αβ
-        still = [(delay, a + 0.5 * load[0][1] @ c) for (delay, a), (_, c) in zip(drift, load, strict=True)]
-    elif "white" not in kind or kind == "chain and white":
+    if kind in ("gaussian", "chain", "chain and white"):
         rate = math.exp(rng.uniform(-0.5, 1.0))
-        if kind == "gaussian":
-            noises, (states, jumps) = [OrnsteinUhlenbeck(rate, 0.5 * math.sqrt(2 * rate))], _gaussian(rate, 0.5)
-        else:
-            jumps = rng.uniform(0.1, 1.5, (3, 3)) + np.array([[0, 2, 0], [0, 0, 2], [2, 0, 0]])
-            states = rng.uniform(-1.5, 1.5, 3)
-            np.fill_diagonal(jumps, 0.0)
-            noises = [MarkovChain(states, jumps)]
-            jumps = jumps - np.diag(jumps.sum(axis=1))
-        white, coloured = [], load
+        noises = [OrnsteinUhlenbeck(rate, 0.5 * math.sqrt(2 * rate)) if kind == "gaussian" else _cycle(1.0, rng)]
     if kind in ("two white", "chain and white"):
-        white, noises = [*white, other], [*noises, White(s=1.0, interpretation="ito")]
-    names = ["xi*"] if len(noises) == 1 else ["xi1*", "xi2*"]
-    free = [("", drift), *zip(names, [load, other], strict=False)]
-    text = "; ".join(f"{each}' = {rate}" for each, rate in zip("xyzu", written(free, "xyzu"[:n]), strict=False))
-    problem = rates(text, noises[0] if len(noises) == 1 else noises)
-    return problem, lambda nodes: Segment(still, coloured, white, states, jumps, nodes)
+        noises.append(White(s=1.0, interpretation="ito"))
+    return with_segment(drift, list(zip([load, other], noises, strict=False)))
 
 
 def numbers_of_delays(seed: int, sizes: tuple[int, int] = (6, 24)) -> Iterator[Number]:

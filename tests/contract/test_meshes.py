@@ -9,7 +9,7 @@ import pytest
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, make_mesh, moment_lyapunov
 from fpsolve.fem import Generator, read_mesh, write_mesh
 from fpsolve.model import CoefficientMatrix, Jump, PlaneSystem
-from tests.oracles import fourier_hermite
+from tests.oracles.planar import series
 
 SHIPPED = Path(__file__).parents[2] / "meshes"
 FIG1 = Problem(
@@ -87,11 +87,9 @@ def test_bounded_noise_cuts_a_mesh_off_at_its_support():
     ("name", "tolerance"), [("coarse", 3e-5), ("default", 1e-11), pytest.param("fine", 5e-13, marks=pytest.mark.slow)]
 )
 def test_error_on_a_shipped_mesh_is_what_the_readme_says(name, tolerance):
-    own, noise, p = FIG1.system, FIG1.noise, [2.0, 6.0]
+    p = [2.0, 6.0]
     found = moment_lyapunov(FIG1, p, mesh=read_mesh(SHIPPED / f"{name}.vtu"))
-    known = {"alpha": noise.alpha, "sigma": noise.sigma, "omega": 1.0, "epsilon": 0.1, "c1": 0.1}
-    sizes = {"log_R": own.log_impact_factor, "harmonics": 8, "hermite": 32}
-    exact = np.array([fourier_hermite.moment_lyapunov(**known, **sizes, p=each) for each in p])
+    exact = np.array([series(FIG1, each, 8, 32) for each in p])
     errors = np.abs(found.value - exact)
     assert np.all(errors <= tolerance * exact)
     assert np.all(errors <= 3 * found.error_estimate + 1e-14)

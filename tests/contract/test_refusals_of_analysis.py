@@ -18,7 +18,6 @@ from fpsolve import (
 )
 from fpsolve.analysis import Axis, excursion, furstenberg_khasminskii, latin_hypercube, laws_of
 from fpsolve.model import Bounded, CoefficientMatrix, CubicTerms, Jump, MarkovChain, PlaneSystem, Telegraph, White
-from fpsolve.tell import draw_eigenfunction
 from tests.kit import itself, rates
 
 NOISE = OrnsteinUhlenbeck(alpha=2.0, sigma=1.5)
@@ -135,7 +134,6 @@ CALLS = {
     "is 0, and so is a share": lambda: laws_of(uniform(0.0), {"system.a": 0.1}),
     "must be a whole number from 2": lambda: latin_hypercube(laws_of(uniform(), {"system.a": 0.1}), 1),
     "at p = 0, but the pair has p = 2": lambda: stationary_density(PAIR(2.0)),
-    "field": lambda: draw_eigenfunction(PAIR(0.0), "U"),
     "two variables": lambda: furstenberg_khasminskii(ExponentSolver(THREE, rtol=1e-2).pair(0.0)),
     "one of the states, -0.8, 0.8": lambda: excursion(spring(Telegraph(a=0.8, k=1.0)), xi=0.7),
     "white noise has no value": lambda: excursion(spring(White(s=0.5)), xi=0.0),

@@ -11,14 +11,14 @@ from scipy.integrate import simpson
 from scipy.stats import norm
 
 import fpsolve
-from fpsolve import NonGaussianNoise, load_case, moment_lyapunov, simulate
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, load_case, moment_lyapunov, simulate
 from fpsolve.analysis import latin_hypercube
+from fpsolve.model import Filter, White
 from fpsolve.solve import compare
 from tests.kit import case_in, case_text, files, read_csv, read_json, run, solve_case
-from tests.oracles import clocked, filtered, fourier_hermite, kronecker, perturbation
-from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent
+from tests.numbers.second import LOAD, even, spring
+from tests.oracles import planar
 
-DRIVEN = ((0.0, 0.0), (-1.0, 0.0))
 ONLY = '[output]\nquantities = ["moment"]\nfigure = false\n'
 PLANE = 'title = "T"\nmoments.p = [2.0]\noutput = { quantities = ["moment"], figure = false }\n'
 PLANE += '[system]\nvariables = ["x", "v"]\n'
@@ -76,18 +76,16 @@ def curves(folder, text, *options, code=0):
 
 
 def gaussian(*rates):
-    return ornstein_uhlenbeck_exponent(((0.0, 1.0), rates), DRIVEN, 2.0, 0.75, 2, 40)
+    return even(2, ((0.0, 1.0), rates), (LOAD, OrnsteinUhlenbeck(2.0, 1.5)), count=40)
 
 
 def by_polynomials():
-    own, xi = (each.toarray() for each in fourier_hermite.bounded_noise(0.3, 0.7, 0.42, 40))
-    return kronecker.several([[0.0, 1.0], [-1.0, -0.2]], [(DRIVEN, own, xi)], [], [], 2, 0.0)
+    driven = LOAD, planar.between_ends(0.3, 0.7, 0.42)
+    return planar.moment_exponent(planar.Planar(spring(1.0, 0.1), (driven,)), 2, 1)[0]
 
 
 def by_reduction():
-    noise = perturbation.reduced(NonGaussianNoise(D0=0.3, tau0=0.7, r0=0.42))
-    deviation = noise.sigma / math.sqrt(2 * noise.alpha)
-    return ornstein_uhlenbeck_exponent(((0.0, 1.0), (-1.0, -0.2)), DRIVEN, noise.alpha, deviation, 2, 40)
+    return even(2, spring(1.0, 0.1), (LOAD, NonGaussianNoise(D0=0.3, tau0=0.7, r0=0.42).ou_reduction()), count=40)
 
 
 def of_modes():
@@ -95,13 +93,18 @@ def of_modes():
     steady[[0, 2], [1, 3]] = 1.0
     steady[1, :2], steady[3, 2:] = (-1.0, -0.1), (-2.56, -0.16)
     driven[1, ::2], driven[3, ::2] = (-0.5, -0.3), (-0.3, -0.5)
-    return filtered.second_moment(steady, driven, (2.0, 0.1, 0.3, 1.0, 0.0), 6)
+    return even(2, steady, (driven, Filter(2.0, 0.1, 0.3, 1.0, 0.0)), count=6)
 
 
 def of_voltage():
-    driven = np.zeros((3, 3))
-    driven[1, 0] = -0.8
-    return kronecker.white(np.array([[0, 1, 0], [-1, -0.1, 0.5], [0, -0.5, -1]]), driven, 2)
+    return even(2, [[0, 1, 0], [-1, -0.1, 0.5], [0, -0.5, -1]], (np.pad(LOAD, (0, 1)), White(0.8)))
+
+
+def of_clock():
+    noises = planar.circle(0.2, 2.0, 0.0), planar.ornstein_uhlenbeck(1.0, 0.3 / math.sqrt(2))
+    system = planar.Planar(spring(), tuple((LOAD, each) for each in noises), log_factor=math.log(0.9))
+    found = planar.nearest(system.generator(2.0, 16, 12)[0], -0.07)
+    return float(np.max(found[np.abs(found.imag) < 1e-8].real))
 
 
 @pytest.mark.parametrize(
@@ -122,7 +125,7 @@ def of_voltage():
         pytest.param(MODES, of_modes, 1e-4, id="two modes"),
         pytest.param(
             PLANE + CLOCK,
-            lambda: clocked.moment_lyapunov(2.0, 0.05, 0.2, 2.0, 1.0, 0.3, 0.9, -0.07),
+            of_clock,
             1e-5,
             id="clock, noise and wall",
             marks=pytest.mark.slow,
@@ -238,7 +241,7 @@ def test_blocks_of_variables_are_solved_one_by_one_and_told_by_name(tmp_path):
     assert [slow["name"], own["name"]] == ["y", "x, v"]
     assert slow["lyapunov_exponent"] == pytest.approx(-0.4, abs=1e-9)
     assert [row["moment"] for row in curve["moments"]] == [row["moment"] for row in own["moments"]]
-    second = kronecker.white([[0.0, 1.0], [-1.0, -0.3]], [[0.0, 0.0], [-0.8, 0.0]], 2)
+    second = even(2, spring(1.0, 0.15), (LOAD, White(0.8)))
     assert curve["moments"][-1]["moment"] == pytest.approx(second, abs=1e-8)
 
 

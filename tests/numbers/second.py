@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.polynomial.hermite_e import hermegauss, hermeval
 
-from fpsolve.model import Bounded, Filter, OrnsteinUhlenbeck, OrnsteinUhlenbeckByDeviation, Poisson, SineWiener, White
+from fpsolve.model import Bounded, Filter, OrnsteinUhlenbeck, Poisson, SineWiener, White
+from tests.kit import rates as problem_of
 from tests.oracles import kronecker
-from tests.oracles.segments import Segment
+from tests.oracles.segments import Segment, written
 
 POINTS = 14
 """Values that stand for Gaussian noise beside a segment."""
@@ -33,7 +34,7 @@ def even(p, drift, *driven, count=24, near=0.0):
                 impulses += [
                     (noise.rate * each, size * load) for each, size in zip(noise.shares, noise.sizes, strict=True)
                 ]
-            case OrnsteinUhlenbeck() | OrnsteinUhlenbeckByDeviation():
+            case _ if hasattr(noise, "alpha"):
                 coloured.append((load, *kronecker.gaussian(noise.alpha, noise.sigma / (2 * noise.alpha) ** 0.5, count)))
             case SineWiener():
                 coloured.append((load, *kronecker.turning(noise.amplitude, 0.0, noise.sigma, count, True)))
@@ -41,7 +42,7 @@ def even(p, drift, *driven, count=24, near=0.0):
                 coloured.append((load, *kronecker.turning(noise.mu, noise.nu, noise.sigma, count, False)))
             case Filter():
                 law = noise.omega, noise.zeta, noise.s, noise.c0, noise.c1
-                coloured.append((load, *kronecker.filtering(law, min(count, 13))))
+                coloured.append((load, *kronecker.filtering(law, min(count, 18))))
             case _:
                 coloured.append((load, *kronecker.jumping(noise.states, noise.rates)))
     return kronecker.several(np.array(drift), coloured, white, impulses, p, near)
@@ -76,3 +77,12 @@ def segment(drift, driven, nodes):
             gauss = isinstance(noise, OrnsteinUhlenbeck)
             states, rates = gaussian(noise) if gauss else (noise.states, np.array(noise.rates, dtype=float))
     return Segment(still, coloured, white, states, rates, nodes)
+
+
+def with_segment(drift, driven):
+    """The problem of these terms, and its discretised path as a function of the nodes."""
+    names, noises = "xyzu"[: len(drift[0][1])], [noise for _, noise in driven]
+    factors = [f"xi{k}*" if len(driven) > 1 else "xi*" for k, _ in enumerate(driven, 1)]
+    text = written([("", drift), *((factor, of) for factor, (of, _) in zip(factors, driven, strict=True))], names)
+    equations = "; ".join(f"{one}' = {rate}" for one, rate in zip(names, text, strict=True))
+    return problem_of(equations, noises if len(noises) > 1 else noises[0]), lambda nodes: segment(drift, driven, nodes)

@@ -17,8 +17,9 @@ from fpsolve.exponent import principal_pair
 from fpsolve.model import Bounded, ParametricOscillator, SineWiener, Telegraph, White
 from tests.conftest import sampled
 from tests.kit import rates
-from tests.numbers.rows.oscillator import PAPER, UNIT, WEAK, paper, series
+from tests.numbers.rows.oscillator import PAPER, UNIT, WEAK, paper
 from tests.oracles import perturbation
+from tests.oracles.planar import series
 
 STRONG = Problem(paper(1.0, 1.0, -0.14), UNIT)
 STEEP = Problem(
@@ -50,7 +51,7 @@ def strong():
 
 @pytest.mark.parametrize("p", [-1.83, -0.4, 1.1, 3.3, 5.9])
 def test_moments_between_nodes_are_those_of_fourier_hermite_series(weak, p):
-    off = abs(weak(p) - series(paper(), WEAK, p))
+    off = abs(weak(p) - series(Problem(paper(), WEAK), p))
     assert off <= weak.error_estimate(p) + 1e-13
     assert weak.error_estimate(p) <= 1e-8 * perturbation.moment_scale(paper(), WEAK, p)
 

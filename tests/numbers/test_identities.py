@@ -20,7 +20,6 @@ from fpsolve import (
     make_mesh,
     moment_lyapunov,
     sensitivities,
-    simulate,
     stability_index,
     stationary_density,
 )
@@ -245,15 +244,6 @@ def test_slope_and_curvature_are_those_of_differences():
         assert second_derivative(pair) == pytest.approx((right.derivative - left.derivative) / (2 * h), rel=1e-5)
 
 
-def test_moments_have_the_order_asked_for_on_which_they_do_not_depend():
-    problem, p = Problem(paper(), WEAK), [3.0, -1.0, 0.0, 3.0]
-    found = moment_lyapunov(problem, p)
-    np.testing.assert_array_equal(found.p, p)
-    np.testing.assert_array_equal(found.value, moment_lyapunov(problem, p[::-1]).value[::-1])
-    alone = [moment_lyapunov(problem, each).value[0] for each in p]
-    assert np.all(np.abs(found.value - alone) <= found.error_estimate)
-
-
 def test_stability_index_near_zero_is_smooth():
     """λ changes its sign with c₁, and δ_p with it: about −2λ/Λ″(0)."""
     found = []
@@ -413,24 +403,3 @@ def test_line_of_stable_second_moments_is_that_of_their_equations(name):
             return np.linalg.eigvals(matrices_of(problem.at({x.key: u}))[0]).real.max()
 
         assert branch.x[np.argmin(branch.y)] == pytest.approx(brentq(growth, 40.0, 56.0), abs=1e-4)
-
-
-RARE = matrices(
-    [[0.0, 1.0], [0.0, -0.005654434667604]],
-    [[-0.947195882077613, -44.46489829714192], [-0.000470764470868, 0.265455967756086]],
-    Poisson(0.002811606864821, (1.140477428600101, -0.302704343214471), (0.234378736233945, 0.712329916975077)),
-)
-"""Impulses so rare that the direction of x comes to rest between them."""
-APART = rates(TEXTS["cascade"].replace("0.16*w", "1.2*w"), White(s=1.0))
-"""Of which one block decays much sooner, so that paths forget it."""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("problem", "p", "options"), [(RARE, [], {"paths": 64}), (APART, [1.0], {"paths": 4096})])
-def test_simulation_gives_lambda_of_elements(problem, p, options):
-    found = simulate(problem, p, seed=1, **options)
-    expected = lyapunov_exponent(problem).value
-    assert found.lyapunov_exponent == pytest.approx(expected, abs=4 * found.lyapunov_exponent_error)
-    assert found.lyapunov_exponent_error < 0.1 * abs(expected)
-    for each in found.estimates:
-        assert each.value == pytest.approx(value(problem, each.p), abs=4 * each.standard_error)

@@ -43,6 +43,7 @@ from fpsolve.model import (
     equations_of,
 )
 from fpsolve.theory import second_order
+from tests.conftest import keeping
 from tests.kit import equations, itself, matrices, rates
 from tests.numbers.rows.delays import ITO
 from tests.numbers.second import LOAD, even, spring
@@ -296,8 +297,7 @@ def test_powers_of_epsilon_in_equations_are_orders_of_their_matrices():
 
 def walled(first=-0.1, second=-0.2):
     """Two walls that telegraph noise does not move the phase across."""
-    rays = np.array([[0.0, math.cos(0.4)], [-1.0, -math.sin(0.4)]])
-    load = CoefficientMatrix(1, rays @ np.diag([0.7, -0.6]) @ np.linalg.inv(rays), itself)
+    load = CoefficientMatrix(1, keeping(math.pi / 2, 0.4), itself)
     system = PlaneSystem(
         [CoefficientMatrix(0, spring(1.44, 0.096)), load], [Jump(math.pi / 2, first), Jump(0.4, second)]
     )

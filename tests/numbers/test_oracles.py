@@ -8,7 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from tests.oracles import closed_forms, fourier_hermite, kronecker, moment_hierarchy, phase_circle, planar
+from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
+from fpsolve.model import Bounded, Poisson, SineWiener, Telegraph, White
+from tests.numbers.second import even
+from tests.oracles import closed_forms, moment_hierarchy, phase_circle, phase_fraction, planar
 
 TURN, SADDLE, SHEAR = [[0.0, -1.0], [1.0, 0.0]], [[1.0, 0.0], [0.0, -1.0]], [[-1.0, 0.0], [5.0, -1.0]]
 STIFF, DAMPED = [[0.0, 0.0], [-1.0, 0.0]], [[0.0, 0.0], [0.0, 0.5]]
@@ -37,14 +40,7 @@ def telegraph(size=0.5):
     return [spring(1 + size, 0.05), spring(1 - size, 0.05)], FLIP
 
 
-def of_paper(law, p, log_factor=-0.2):
-    """Λ(p) for ω = 1.3, ε = 0.7, c₁ = 0.2."""
-    drift = np.array([[0.0, 1.3], [-1.3, 0.098]])
-    known = planar.Planar(drift, ((np.diag([0.0, 0.7]), law),), log_factor=log_factor)
-    return planar.fourier_exponent(known, p, 1)[0]
-
-
-PAPER = {"omega": 1.3, "epsilon": 0.7, "c1": 0.2, "log_R": -0.2, "harmonics": 24}
+PAPER = VibroImpactOscillator(omega=1.3, epsilon=0.7, c1=0.2, restitution=0.6)
 NODE = spring(0.7, 1.2), (DRIVEN, 2.0, 0.7), (np.array(DAMPED), 5.0, 0.9)
 EXPONENT, SECOND, AT_MINUS_ONE = closed_forms.saddle_and_turning()
 SAME = {
@@ -58,7 +54,7 @@ SAME = {
     **{
         f"Λ({p}), a free particle": (
             lambda a=a: a ** (1 / 3),
-            lambda p=p: moment_hierarchy.white_noise_exponent(spring(0.0, 0.0), [STIFF], p),
+            lambda p=p: even(p, spring(0.0, 0.0), (STIFF, White(1.0))),
             lambda p=p: circle_of_white(spring(0.0, 0.0), [STIFF], p),
         )
         for p, a in ((2, 2), (4, 42))
@@ -72,7 +68,7 @@ SAME = {
     },
     **{
         f"Λ({p}), {sense}": (
-            lambda p=p, sense=sense: moment_hierarchy.white_noise_exponent(spring(), [DAMPED], p, sense),
+            lambda p=p, sense=sense: even(p, spring(), (DAMPED, White(1.0, sense))),
             lambda p=p, sense=sense: circle_of_white(spring(), [DAMPED], p, sense=sense),
         )
         for p in (2, 4)
@@ -81,10 +77,10 @@ SAME = {
     "Λ(2), telegraph": (
         lambda: moment_hierarchy.moment_lyapunov(*telegraph(), 2),
         lambda: phase_circle.moment_exponent(phase_circle.chain(*telegraph()), 2, 30),
-        lambda: kronecker.chain(spring(1.0, 0.05), STIFF, [0.5, -0.5], FLIP, 2),
+        lambda: even(2, spring(1.0, 0.05), (STIFF, Telegraph(0.5, 1.0))),
     ),
     "Λ(2), Ornstein-Uhlenbeck": (
-        lambda: moment_hierarchy.ornstein_uhlenbeck_exponent(spring(), STIFF, 1.0, 0.7, 2, 20),
+        lambda: even(2, spring(), (STIFF, OrnsteinUhlenbeck(1.0, 0.7 * math.sqrt(2)))),
         lambda: phase_circle.moment_exponent(
             phase_circle.ornstein_uhlenbeck(spring(), STIFF, 1.0, 0.7, 20), 2, 24, start=0.1
         ),
@@ -92,21 +88,21 @@ SAME = {
     "λ, a saddle that turns": (lambda: EXPONENT, lambda: circle_of_white(SADDLE, [TURN])),
     "Λ(2), a saddle that turns": (
         lambda: SECOND,
-        lambda: moment_hierarchy.white_noise_exponent(SADDLE, [TURN], 2),
+        lambda: even(2, SADDLE, (TURN, White(1.0))),
         lambda: circle_of_white(SADDLE, [TURN], 2),
     ),
     "Λ(-1), a saddle that turns": (lambda: AT_MINUS_ONE, lambda: circle_of_white(SADDLE, [TURN], -1)),
     "Λ(2), shear that turns": (
-        lambda: moment_hierarchy.white_noise_exponent(SHEAR, [TURN], 2),
+        lambda: even(2, SHEAR, (TURN, White(1.0))),
         lambda: circle_of_white(SHEAR, [TURN], 2),
     ),
     "Λ(4), two white noises": (  # x∘dW₁ + Jx∘dW₂, where Jx only turns: ½cp + ½p²
         lambda: 0.15 * 4 + 0.5 * 4**2,
-        lambda: moment_hierarchy.white_noise_exponent(0.15 * np.eye(2), [np.eye(2), TURN], 4),
+        lambda: even(4, 0.15 * np.eye(2), (np.eye(2), White(1.0)), (TURN, White(1.0))),
         lambda: circle_of_white(0.15 * np.eye(2), [np.eye(2), TURN], 4, 8),
     ),
     "Λ(2), bounded": (
-        lambda: moment_hierarchy.bounded_exponent(spring(), STIFF, *LAW, 2, 12),
+        lambda: even(2, spring(), (STIFF, Bounded(*LAW))),
         lambda: phase_circle.moment_exponent(phase_circle.bounded(spring(), STIFF, *LAW, 16), 2, 24, start=0.0),
     ),
     "Λ(2), harmonic and white": (
@@ -114,29 +110,40 @@ SAME = {
         lambda: moment_hierarchy.bounded_exponent(spring(), STIFF, 0.4, 2.0, 0.0, 2, 20, load(0.3)),
     ),
     "Λ(4), sine-Wiener": (
-        lambda: moment_hierarchy.sine_wiener_exponent(STEADY, DRIVEN, 0.4, 1.3, 4, 12),
+        lambda: even(4, STEADY, (DRIVEN, SineWiener(0.4, 1.3))),
         lambda: planar.moment_exponent(planar.Planar(STEADY, ((DRIVEN, planar.circle(0.4, 0.0, 1.3)),)), 4, 1)[0],
     ),
     "Λ(4), two Ornstein-Uhlenbeck noises": (
-        lambda: kronecker.several(NODE[0], [(a, *kronecker.gaussian(*law, 14)) for a, *law in NODE[1:]], p=4),
+        lambda: even(
+            4,
+            NODE[0],
+            *((a, OrnsteinUhlenbeck(rate, size * math.sqrt(2 * rate))) for a, rate, size in NODE[1:]),
+            count=14,
+            near=None,
+        ),
         lambda: planar.moment_exponent(
             planar.Planar(NODE[0], tuple((a, planar.ornstein_uhlenbeck(*law)) for a, *law in NODE[1:])), 4, 2
         )[0],
     ),
     "Λ(6), impulses": (
-        lambda: moment_hierarchy.impulses_exponent(STEADY, DRIVEN, 1.3, (0.5, -0.7), (0.3, 0.7), 6),
+        lambda: even(6, STEADY, (DRIVEN, Poisson(1.3, (0.5, -0.7), (0.3, 0.7)))),
         lambda: phase_circle.moment_exponent(
             phase_circle.impulses(STEADY, DRIVEN, 1.3, (0.5, -0.7), (0.3, 0.7)), 6, 24
         ),
     ),
-    "Λ(1.5), a wall and Ornstein-Uhlenbeck": (
-        lambda: fourier_hermite.moment_lyapunov(**PAPER, alpha=1.0, sigma=1.0, p=1.5, hermite=30),
-        lambda: of_paper(planar.ornstein_uhlenbeck(1.0, math.sqrt(0.5)), 1.5),
-    ),
-    "Λ(-2), a wall and bounded support": (
-        lambda: fourier_hermite.moment_lyapunov_bounded_noise(**PAPER, D0=0.5, tau0=0.6, r0=0.8, p=-2.0, gegenbauer=24),
-        lambda: of_paper(planar.between_ends(0.5, 0.6, 0.8), -2.0),
-    ),
+    **{
+        f"Λ({p}), a wall and {name}": (
+            lambda noise=noise, p=p: planar.fourier_exponent(planar.of_paper(PAPER, noise), p, 1)[0],
+            lambda noise=noise, p=p: planar.series(Problem(PAPER, noise), p, 24, 30),
+            lambda noise=noise, p=p, near=near: phase_fraction.moment_lyapunov(
+                PAPER, noise, p, near, harmonics=24, polynomials=30, tilt=0.0
+            ),
+        )
+        for name, noise, p, near in (
+            ("Ornstein-Uhlenbeck", OrnsteinUhlenbeck(alpha=1.0, sigma=1.0), 1.5, 0.1),
+            ("bounded support", NonGaussianNoise(D0=0.5, tau0=0.6, r0=0.8), -2.0, 0.1),
+        )
+    },
 }
 
 

@@ -8,10 +8,9 @@ import pytest
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, make_mesh
 from fpsolve.exponent import principal_pair
 from fpsolve.fem import Generator
-from tests.oracles import fourier_hermite
+from tests.oracles.planar import series
 
 OSCILLATOR = VibroImpactOscillator(omega=1.2, restitution=0.7, c1=0.1, epsilon=0.3)
-KNOWN = {"omega": 1.2, "epsilon": 0.3, "c1": 0.1, "log_R": OSCILLATOR.log_impact_factor, "p": 2.0, "harmonics": 14}
 GAUSS = OrnsteinUhlenbeck(alpha=1.1, sigma=1.0)
 XI, PHI = {"xi_cells": 5, "xi_degree": 12}, {"phi_cells": 2, "phi_degree": 14}
 """Fine."""
@@ -23,9 +22,7 @@ def bounded(r0: float) -> NonGaussianNoise:
 
 @cache
 def exact(noise) -> float:
-    if noise == GAUSS:
-        return fourier_hermite.moment_lyapunov(alpha=1.1, sigma=1.0, hermite=40, **KNOWN)
-    return fourier_hermite.moment_lyapunov_bounded_noise(D0=0.6, tau0=0.9, r0=noise.r0, gegenbauer=40, **KNOWN)
+    return series(Problem(OSCILLATOR, noise), 2.0, 14)
 
 
 def errors(meshes, noise=GAUSS):

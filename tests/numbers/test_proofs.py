@@ -40,7 +40,9 @@ from fpsolve.model import (
 from fpsolve.proofs import objection, prove_lyapunov_exponent, prove_stability_index
 from tests.conftest import sampled
 from tests.kit import chain_of_masses, itself, matrices
-from tests.oracles import certificate_checker, closed_forms, fourier_hermite, kronecker, moment_hierarchy, phase_circle
+from tests.numbers.by_problem import by_moments
+from tests.oracles import certificate_checker, closed_forms, kronecker, phase_circle
+from tests.oracles.planar import series
 
 STIFFNESS, VELOCITY, TURN = ((0.0, 0.0), (-1.0, 0.0)), ((0.0, 0.0), (0.0, 1.0)), ((0.0, -1.0), (1.0, 0.0))
 SADDLE, SHEAR, NEGATIVE = ((1.0, 0.0), (0.0, -1.0)), ((-1.0, 0.0), (5.0, -1.0)), ((0.0, 1.0), (-1.0, 0.1))
@@ -73,17 +75,6 @@ def bounded(D0: float = 1.0, tau0: float = 0.5, r0: float = 0.95) -> NonGaussian
 
 def reduced(*args: float, **more: float):
     return bounded(*args, **more).ou_reduction()
-
-
-def series(problem: Problem, p: float, harmonics: int = 12, functions: int = 40) -> float:
-    """Λ(p) by Fourier series with polynomials of the noise."""
-    motion, noise = problem.system, problem.noise
-    how = {name: getattr(motion, name) for name in ("omega", "epsilon", "c1")}
-    how |= {"log_R": motion.log_impact_factor, "p": p, "harmonics": harmonics}
-    if isinstance(noise, NonGaussianNoise):
-        law = {name: getattr(noise, name) for name in ("D0", "tau0", "r0")}
-        return fourier_hermite.moment_lyapunov_bounded_noise(**law, gegenbauer=functions, **how)
-    return fourier_hermite.moment_lyapunov(alpha=noise.alpha, sigma=noise.sigma, hermite=functions, **how)
 
 
 def elements(problem: Problem, p: float | None) -> float:
@@ -157,7 +148,7 @@ UNEVEN = PlaneSystem(
 
 def even(problem: Problem, p: float) -> float:
     """Of `UNEVEN`, in (x, ẋ/ω)."""
-    return series(paper(problem.noise, 0.8, 0.1, 0.2, 1.3, impact="restitution"), p, 12, 40)
+    return series(paper(problem.noise, 0.8, 0.1, 0.2, 1.3, impact="restitution"), p)
 
 
 VOLTS = White(s=0.5)
@@ -186,7 +177,7 @@ PROOFS = {
     "Gaussian, another": Proof(paper(OrnsteinUhlenbeck(1.7, 0.9)), -1.0, series, 1e-9),
     "Gaussian, paths": Proof(paper(reduced()), None, elements, 1e-7),
     "Gaussian, strong": Proof(
-        paper(reduced(0.3), epsilon=1.0), 1.0, functools.partial(series, harmonics=20, functions=60), 2e-5, slow=True
+        paper(reduced(0.3), epsilon=1.0), 1.0, functools.partial(series, modes=20, size=60), 2e-5, slow=True
     ),
     "Gaussian, without loss, closed form": Proof(
         paper(reduced(0.2), 1.0, epsilon=0.2),
@@ -209,23 +200,14 @@ PROOFS = {
     **{
         f"Gaussian, stiffness {k}, deviation {deviation}": Proof(
             spring(OrnsteinUhlenbeck(1.0, deviation * math.sqrt(2)), 0.1, k),
-            2.0,
-            lambda *_, k=k, deviation=deviation: moment_hierarchy.ornstein_uhlenbeck_exponent(
-                oscillating(0.1, k), STIFFNESS, 1.0, deviation, 2, 80
-            ),
+            2,
+            functools.partial(by_moments, count=80),
             width,
             slow=True,
         )
         for k, deviation, width in ((100.0, 2.0, 1e-8), (1.0, 0.2 / math.sqrt(2), 1e-8), (1.0, math.sqrt(0.5), 0.1))
     },
-    **{
-        f"white, p = {p}": Proof(
-            spring(VOLTS),
-            p,
-            lambda *_, p=p: moment_hierarchy.white_noise_exponent(oscillating(), [0.5 * np.array(STIFFNESS)], p),
-        )
-        for p in (2, 4)
-    },
+    **{f"white, p = {p}": Proof(spring(VOLTS), p, by_moments) for p in (2, 4)},
     "white, paths": Proof(spring(VOLTS), None, lambda *_: closed_forms.white_stiffness(1.0, 0.5, 0.1)),
     "white, a wall": Proof(spring(VOLTS, factor=0.8), 2.0, white(oscillating(), STIFFNESS, 0.5, 0.8)),
     "white, a wall, paths": Proof(
@@ -260,9 +242,7 @@ PROOFS = {
         for k, p in enumerate((None, 2.0, -1.0))
     },
     **{f"shear, {p}": Proof(matrices(SHEAR, TURN, White(s=1.0)), p, white(SHEAR, TURN, 1.0)) for p in (2.0, None)},
-    "telegraph": Proof(
-        spring(Telegraph(0.5, 1.0), 0.05), 2.0, lambda *_: moment_hierarchy.moment_lyapunov(STATES_OF_SPRING, FLIP, 2)
-    ),
+    "telegraph": Proof(spring(Telegraph(0.5, 1.0), 0.05), 2, by_moments),
     "telegraph, paths": Proof(
         spring(Telegraph(0.5, 1.0), 0.05), None, by_phase(phase_circle.chain(STATES_OF_SPRING, FLIP))
     ),
@@ -285,8 +265,8 @@ PROOFS = {
     ),
     "lopsided telegraph": Proof(
         spring(Lopsided(0.5, 1.0)),
-        2.0,
-        lambda *_: moment_hierarchy.moment_lyapunov(at(oscillating(), (0.0, 1.5)), FLIP, 2),
+        2,
+        by_moments,
     ),
     **{
         f"chain, a wall, {p}": Proof(
@@ -300,7 +280,7 @@ PROOFS = {
         f"sine-Wiener, {p}": Proof(
             spring(SineWiener(1.0, 1.0)),
             p,
-            lambda *_, p=p: moment_hierarchy.sine_wiener_exponent(oscillating(), STIFFNESS, 1.0, 1.0, p, 12),
+            by_moments,
             slow=p == 4,
         )
         for p in (2, 4)

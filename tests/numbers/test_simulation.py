@@ -44,7 +44,9 @@ from fpsolve.model import (
 from fpsolve.simulation import simulated_response
 from tests.conftest import sampled
 from tests.kit import chain_of_masses, itself, matrices, rates
-from tests.oracles import closed_forms, moment_hierarchy, phase_circle
+from tests.numbers.by_problem import by_moments
+from tests.numbers.rows.blocks import TEXTS
+from tests.oracles import closed_forms, phase_circle
 
 COVERED = 4.0
 """Multiple of the standard error within which a number must be."""
@@ -116,9 +118,15 @@ DAMPED = [phase_circle.white(NEGATIVE, [0.5 * np.array(VELOCITY)], sense) for se
 WALLED = phase_circle.white(((0.0, 1.0), (-1.0, -0.2)), [((0.0, 0.0), (-0.5, 0.0))])
 VELOCITY_WALL = "x' = v; v' = -x + 0.1*v + xi*v"
 WALL = [{"at": "x = 0", "restitution": 0.8}]
-SLOW_STEADY, SLOW_DRIVEN = np.array([[0.4, 0.95], [-1.2, -0.1]]), np.array([[0.07, 0.09], [0.02, 0.32]])
-SLOW_CHAIN = (-2.5, -1.4, -2.4), np.array([[-0.08, 0.075, 0.005], [2.9, -4.0, 1.1], [0.9, 0.2, -1.1]])
 MASSES, STRETCH, _ = chain_of_masses(3, 0.2)
+RARE = matrices(
+    [[0.0, 1.0], [0.0, -0.005654434667604]],
+    [[-0.947195882077613, -44.46489829714192], [-0.000470764470868, 0.265455967756086]],
+    Poisson(0.002811606864821, (1.140477428600101, -0.302704343214471), (0.234378736233945, 0.712329916975077)),
+)
+"""Impulses so rare that the direction of x comes to rest between them."""
+APART = rates(TEXTS["cascade"].replace("0.16*w", "1.2*w"), White(s=1.0))
+"""Of which one block decays much sooner, so that paths forget it."""
 DELAYED = rates("x' = v; v' = -x - 0.4*v + 0.3*x(t - 1.0) - xi*x(t - 1.0)", White(s=0.1))
 
 
@@ -127,7 +135,7 @@ KNOWN = {
         spring(Telegraph(a=0.5, k=1.0)),
         {
             None: by_phase(phase_circle.chain(STATES, FLIP), None),
-            2: lambda: moment_hierarchy.moment_lyapunov(STATES, FLIP, 2),
+            2: lambda: by_moments(KNOWN["telegraph"].problem, 2),
         },
         slow=False,
     ),
@@ -152,11 +160,7 @@ KNOWN = {
     ),
     "Gaussian, by populations": Simulated(
         spring(OrnsteinUhlenbeck(1.0, 0.5), 0.1),
-        {
-            2: lambda: moment_hierarchy.ornstein_uhlenbeck_exponent(
-                ((0.0, 1.0), (-1.0, -0.2)), ((0.0, 0.0), (-1.0, 0.0)), 1.0, 0.5 / math.sqrt(2), 2, 60
-            )
-        },
+        {2: lambda: by_moments(KNOWN["Gaussian, by populations"].problem, 2, 60)},
         estimator="population",
         time=200.0,
     ),
@@ -168,12 +172,12 @@ KNOWN = {
         8192,
     ),
     "a phase that noise hardly disturbs": Simulated(
-        matrices(SLOW_STEADY.tolist(), SLOW_DRIVEN.tolist(), MarkovChain(*(each for each in SLOW_CHAIN))),
-        {
-            2: lambda: moment_hierarchy.moment_lyapunov(
-                [SLOW_STEADY + xi * SLOW_DRIVEN for xi in SLOW_CHAIN[0]], SLOW_CHAIN[1], 2
-            )
-        },
+        matrices(
+            [[0.4, 0.95], [-1.2, -0.1]],
+            [[0.07, 0.09], [0.02, 0.32]],
+            MarkovChain((-2.5, -1.4, -2.4), [[0.0, 0.075, 0.005], [2.9, 0.0, 1.1], [0.9, 0.2, 0.0]]),
+        ),
+        {2: lambda: by_moments(KNOWN["a phase that noise hardly disturbs"].problem, 2)},
         5e-4,
         "population",
         time=100.0,
@@ -203,6 +207,8 @@ KNOWN = {
         1e-2,
         paths=1024,
     ),
+    "rare impulses": Simulated(RARE, elements(RARE, None), 2.7e-5, paths=64),
+    "blocks": Simulated(APART, elements(APART, None, 1.0)),
     "a delay": Simulated(DELAYED, {2: lambda: even_moment(DELAYED, 2).value}, 5e-3, "population", 4096),
 }
 

@@ -16,7 +16,7 @@ from fpsolve import (
 from fpsolve.exponent import principal_pair, spectrum
 from fpsolve.fem import Generator
 from fpsolve.model import Noises, Telegraph
-from tests.oracles import fourier_hermite
+from tests.oracles import planar
 
 UNIT = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 EXACT = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
@@ -97,9 +97,13 @@ def test_spectrum_of_the_full_circle_is_that_of_fourier_series(p):
     mesh = make_mesh(full_circle=True, phi_degree=11, xi_cells=2, xi_degree=11)
     own = Problem(oscillator(0.3), OrnsteinUhlenbeck(alpha=1.2, sigma=0.9))
     values = spectrum(Generator(own, mesh), p, 7)
-    known = {"omega": 1.0, "epsilon": 0.3, "c1": 0.1, "log_R": own.system.log_impact_factor}
-    right = fourier_hermite.spectrum(alpha=1.2, sigma=0.9, **known, p=p, harmonics=20, hermite=14)[:7]
-    np.testing.assert_allclose(np.sort_complex(values), np.sort_complex(right), atol=1e-8)
+    right = []
+    for turn in (0.0, 1j * np.pi / p):  # exp(iφ) times what has the period π
+        matrix, *_ = planar.of_paper(own.system, own.noise, turn).generator(p, 12, 14)
+        right += [*np.linalg.eigvals(matrix.toarray())]
+    right = sorted(right, key=lambda each: -each.real)[:7]
+    by_frequency = [np.sort_complex(1j * np.array(each)) for each in (values, right)]
+    np.testing.assert_allclose(*by_frequency, atol=1e-8)
     assert np.all(np.diff(values.real) < 1e-10)
 
 

@@ -1,7 +1,6 @@
 """Λ₂ of weak noise: the paper's Eqs. (33)-(39) are an instance, and Λ − ε²Λ₂ is of the order ε⁴."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from fpsolve import (
 )
 from fpsolve.model import Bounded, CoefficientMatrix, Jump, MarkovChain, White
 from fpsolve.theory import FrozenNoise, first_order_eigenfunction, scale_of, second_order
+from tests.conftest import keeping
 from tests.kit import itself, matrices
 from tests.numbers.second import LOAD, spring
 from tests.oracles import perturbation
@@ -26,12 +26,6 @@ ROTATION = ((0.0, 1.0), (-1.0, 0.0))
 GAUSSIAN = OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)
 SKEWED = MarkovChain((-1.0, 0.5), ((0, 1.0), (0.5, 0)))
 P = np.array([-2.0, -0.3, 0.0, 1.0, 5.0])
-
-
-def keeping(first, second, sizes=(0.7, -0.6)):
-    """The matrix of a noise that moves the phase over neither of two rays."""
-    rays = np.array([[np.cos(first), np.cos(second)], [-np.sin(first), -np.sin(second)]])
-    return rays @ np.diag(sizes) @ np.linalg.inv(rays)
 
 
 @pytest.mark.parametrize("law", ["delta", "restitution"])
@@ -53,28 +47,6 @@ def test_second_order_of_the_papers_oscillator_is_eqs_33_to_39(noise, law):
     phi, xi = np.linspace(0, 6, 7)[:, None], np.linspace(-2, 2, 5)
     ours = first_order_eigenfunction(Problem(oscillator, noise), 1.4, phi, xi)
     assert_allclose(ours, perturbation.first_order_eigenfunction(oscillator, noise, 1.4, phi, xi), rtol=1e-13)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "noise", "p"),
-    [
-        ((1.0, 0.8, 0.1), OrnsteinUhlenbeck(alpha=2.047619, sigma=2.828427), -2.0),
-        ((3.0, 0.7, -0.2), OrnsteinUhlenbeck(alpha=8.0, sigma=6.0), 1.0),
-        ((2.0, 0.9, 0.3), OrnsteinUhlenbeck(alpha=0.7, sigma=0.8), 4.0),
-    ],
-)
-def test_exponent_leaves_the_second_order_by_epsilon_to_the_fourth(parameters, noise, p):
-    """The next term is ε⁶: each halving of ε divides the distance to the limit by four."""
-    constants = []
-    for epsilon in (0.2, 0.1, 0.05, 0.025):
-        oscillator = VibroImpactOscillator(*parameters, epsilon)
-        value = ExponentSolver(Problem(oscillator, noise), rtol=1e-12).pair(p).value
-        constants.append((value - perturbation.moment_exponent(oscillator, noise, p)) / epsilon**4)
-    steps = np.abs(np.diff(constants))
-    assert abs(constants[-1]) > 1e-6
-    limits = [(4 * fine - coarse) / 3 for coarse, fine in pairwise(constants)]
-    assert limits[2] == pytest.approx(limits[1], rel=2e-3)
-    assert_allclose(steps[:-1] / steps[1:], 4, rtol=0.25)
 
 
 @pytest.mark.parametrize(("noise", "order", "slack"), [(GAUSSIAN, 2, 0.05), (SKEWED, 1, 0.2)], ids=["OU", "chain"])

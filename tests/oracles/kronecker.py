@@ -29,23 +29,6 @@ def power(matrix, p):
     return found
 
 
-def white(steady, driven, p):
-    """Stratonovich, S = 1."""
-    return several(steady, [], [(driven, "stratonovich")], p=p)
-
-
-def chain(steady, driven, states, rates, p):
-    """A₀ + ξA₁ for a chain; rates[i][j] from i to j, whatever the diagonal is."""
-    rates = np.array(rates, dtype=float)
-    np.fill_diagonal(rates, 0.0)
-    return several(steady, [(driven, *jumping(states, rates))], p=p)
-
-
-def ornstein_uhlenbeck(steady, driven, alpha, deviation, p, count):
-    """A₀ + ξA₁."""
-    return several(steady, [(driven, *gaussian(alpha, deviation, count))], p=p)
-
-
 def gaussian(alpha, deviation, count):
     """Rates and ξ of Ornstein-Uhlenbeck noise by normalised Hermite polynomials."""
     ladder = np.diag(np.sqrt(np.arange(1.0, count)), 1)

@@ -16,6 +16,8 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, eigsh, splu
 
+from fpsolve import NonGaussianNoise
+
 DENSE = 350
 """Functions up to which all eigenvalues are computed."""
 MOST, MOST_IN_BAND = 30_000, 40_000
@@ -188,6 +190,35 @@ class Planar:
             constant = np.kron(constant, first)
         middle = np.eye(1, 2 * modes + 1)[0]
         return sparse.csc_array(total), sparse.csc_array(slope), np.kron(middle, constant)
+
+
+def of_paper(oscillator, noise, log_factor=0.0):
+    """The paper's oscillator under the noise of Eq. (7), r₀ < 1, or Ornstein-Uhlenbeck noise; what is added to ln R."""
+    law = (
+        between_ends(noise.D0, noise.tau0, noise.r0)
+        if isinstance(noise, NonGaussianNoise)
+        else ornstein_uhlenbeck(noise.alpha, noise.standard_deviation)
+    )
+    drift = np.array([[0.0, oscillator.omega], [-oscillator.omega, oscillator.epsilon**2 * oscillator.c1]])
+    driven = ((np.diag([0.0, oscillator.epsilon]), law),)
+    return Planar(drift, driven, log_factor=oscillator.log_impact_factor + log_factor)
+
+
+def series(problem, p, modes=12, size=40):
+    """Λ(p) of the paper's oscillator by so many functions, read off the row of the constant function in Lu = Λu.
+
+    Noise and the derivative in φ have no part in that row, so no large numbers cancel. A strong tilt leaves little of
+    the constant function; then the eigenvalue itself is as good.
+    """
+    system = of_paper(problem.system, problem.noise)
+    few, matrix, constant = system.generator(p, 6, 26)[0], *system.generator(p, modes, size)[::2]
+    value, vector = rightmost(matrix, rightmost(few)[0].real)[0].real, constant
+    factors = splu((matrix - (value + 1e-9 * abs(value)) * sparse.eye_array(constant.size)).tocsc())
+    for _ in range(2):
+        vector = factors.solve(vector)
+        vector = vector / np.max(np.abs(vector))
+    share = constant @ vector
+    return float(constant @ (matrix @ vector) / share) if abs(share) > 0.1 else value
 
 
 def phases(matrix, p, modes, log_factor=0.0):

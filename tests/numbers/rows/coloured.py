@@ -1,16 +1,16 @@
 """Noise of Eq. (7) and filtered noise: moments over polynomials of the noise, and Fourier series of the phase."""
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from fpsolve import NonGaussianNoise
 from fpsolve.model import Filter, OrnsteinUhlenbeck
 from tests.kit import matrices
-from tests.numbers.rows.even import ACROSS, LAWS, NODE, NODE_FILTER, NODE_NOISE, SADDLE
-from tests.numbers.second import LOAD, even, spring
+from tests.numbers.rows.even import ACROSS, FAST, NODE, NODE_FILTER, NODE_NOISE, SADDLE
+from tests.numbers.second import LOAD, even, slope_of, spring
 from tests.numbers.values import Row, by, closed, closed_by, moment
-from tests.oracles import planar, two_noises
+from tests.oracles import planar
 
 SLOW = (0.62, 0.71, 0.28, 1.0, 2.3)
 LEANING = np.array([[0.0, 1.0], [-1.0, -1.4]]), np.array([[0.04, 0.9], [0.95, 0.1]])
@@ -35,12 +35,7 @@ def at_end(h=0.001):
     return sum(w * between(1 - k * h) for k, w in enumerate(weights)) / (12 * h)
 
 
-def inside(name, r0=0.5):
-    at = {"r0": r0, "tau0": 0.7, "D0": 0.3}
-    ends = [between(**{**at, name: at[name] * (1 + k * 1e-2)}) for k in (-2, -1, 1, 2)]
-    return (8 * (ends[2] - ends[1]) - (ends[3] - ends[0])) / (12 * at[name] * 1e-2)
-
-
+AT = {"r0": 0.5, "tau0": 0.7, "D0": 0.3}
 ROWS = [
     *(
         Row(eq_7(r0), quantity, lambda r0=r0: between(r0), 1e-10, 1e-7, f"polynomials between ends, r₀ = {r0}")
@@ -53,7 +48,14 @@ ROWS = [
         for each in (closed_by("noise.r0", 2), by("noise.r0", 2.0))
     ),
     *(
-        Row(eq_7(0.5), make(f"noise.{name}", 2), lambda name=name: inside(name), 1e-7, 1e-4, "differences at r₀ = 0.5")
+        Row(
+            eq_7(0.5),
+            make(f"noise.{name}", 2),
+            partial(slope_of, between, name, 1e-2, **AT),
+            1e-7,
+            1e-4,
+            "differences at r₀ = 0.5",
+        )
         for name in ("r0", "tau0", "D0")
         for make in (closed_by, by)
     ),
@@ -78,11 +80,9 @@ ROWS = [
     ),
     *(
         Row(
-            matrices(SADDLE, ACROSS, [OrnsteinUhlenbeck(*law) for law in LAWS]),
+            matrices(SADDLE, ACROSS, FAST),
             closed(p),
-            lambda p=p: two_noises.moment_lyapunov(
-                (SADDLE, *ACROSS), [a for a, _ in LAWS], [s / (2 * a) ** 0.5 for a, s in LAWS], p, 6
-            ),
+            lambda p=p: even(p, SADDLE, *zip(ACROSS, FAST, strict=True), count=6),
             1e-9,
             1e-9,
             "a saddle whose |x|^(p − k)|v|^k is nearly an eigenfunction",

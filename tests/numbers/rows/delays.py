@@ -11,9 +11,8 @@ from fpsolve.exponent import even_moment
 from fpsolve.model import OrnsteinUhlenbeck, Telegraph, White
 from tests.kit import rates
 from tests.numbers.rows.even import CHAIN
-from tests.numbers.second import segment, slope_of
+from tests.numbers.second import slope_of, with_segment
 from tests.numbers.values import Quantity, Row, by, closed, closed_by
-from tests.oracles.segments import written
 
 ITO = White(s=1.0, interpretation="ito")
 SCALAR = "x' = a*x + b*xi*x(t - tau)"
@@ -44,12 +43,7 @@ def drawn(name, delays, n):
 
     drift, driven = terms(1.0), [(terms(0.7), noise) for noise in NOISES[name]]
     drift[0] = 0.0, drift[0][1] - 1.5 * np.eye(n)
-    names = "xyzu"[:n]
-    factors = [f"xi{k}*" if len(driven) > 1 else "xi*" for k, _ in enumerate(driven, 1)]
-    text = written([("", drift), *((factor, of) for factor, (of, _) in zip(factors, driven, strict=True))], names)
-    equations = "; ".join(f"{one}' = {rate}" for one, rate in zip(names, text, strict=True))
-    noises = [noise for _, noise in driven]
-    return rates(equations, noises if len(noises) > 1 else noises[0]), lambda nodes: segment(drift, driven, nodes)
+    return with_segment(drift, driven)
 
 
 def beside(name, delay, n):

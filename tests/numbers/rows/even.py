@@ -20,7 +20,6 @@ from fpsolve.model import (
 from tests.kit import chain_of_masses, matrices
 from tests.numbers.second import LOAD, even, spring
 from tests.numbers.values import Row, closed, moment
-from tests.oracles import filtered
 
 CHAIN = MarkovChain((-0.8, 0.1, 0.5), ((0, 1.3, 0.2), (0.1, 0, 2.0), (1.4, 0.3, 0)))
 NOISES = {
@@ -41,7 +40,7 @@ SADDLE = ((-1.0115024817178828, 0.027976596819670015), (3.2543543385618436, -2.1
 NODE = ((-0.5727022764659979, 0.03844029130717129), (-0.38124973260501926, 0.4070870137016061))
 NODE_NOISE = ((0.4281962803847412, -0.8337860010391915), (-0.25061621100201587, -0.24215772694411056))
 NODE_FILTER = (1.4957362099052074, 0.3305436240665941, 0.05885385917131965, 2.237226809621595, 0.9888121349393983)
-LAWS = (37.431388258716034, 32.74906196496099), (32.63567554169098, 8.536346218849552)
+FAST = OrnsteinUhlenbeck(37.431388258716034, 32.74906196496099), OrnsteinUhlenbeck(32.63567554169098, 8.536346218849552)
 ACROSS = ((0, 0), (1, 0)), ((0, 0), (0, 1))
 
 
@@ -110,12 +109,12 @@ def patches(n, mu, delta, square):
 
 def filters(output, zeta, values):
     """A spring under a filter of standard deviation 0.3, by elements."""
-    law = 2.0, zeta, filtered.strength(2.0, zeta, *output, 0.3), *output
+    noise = Filter(2.0, zeta, 0.3 / Filter(2.0, zeta, 1.0, *output).standard_deviation, *output)
     return [
         Row(
-            lambda: matrices(spring(), LOAD, Filter(*law)),
+            lambda: matrices(spring(), LOAD, noise),
             moment(p),
-            value or (lambda p=p: filtered.moment_lyapunov(spring(), LOAD, law, p, 18 if zeta < 0.2 else 12)),
+            value or (lambda p=p: even(p, spring(), (LOAD, noise), count=18 if zeta < 0.2 else 12, near=None)),
             2e-11,
             1e-7,
             f"moments under a filter {output}, ζ = {zeta}",

@@ -1,6 +1,5 @@
 """More than four variables: even p, by Kronecker products."""
 
-import math
 from functools import partial
 
 import numpy as np
@@ -8,8 +7,9 @@ import numpy as np
 from fpsolve import OrnsteinUhlenbeck, Problem
 from fpsolve.model import ModalSystem, Poisson, White
 from tests.kit import chain_of_masses, matrices
+from tests.numbers.by_problem import by_moments
+from tests.numbers.second import even
 from tests.numbers.values import Row, moment, slope, slope_by
-from tests.oracles import kronecker
 
 
 def masses(count: int, noise, damping: float = 0.02):
@@ -23,7 +23,7 @@ def masses(count: int, noise, damping: float = 0.02):
 
 def by_kronecker(count: int, p: int, alpha: float = 1.0, sigma: float = 0.3, zeta: float = 0.02) -> float:
     free, driven, _ = chain_of_masses(count, zeta)
-    return kronecker.ornstein_uhlenbeck(free, driven, alpha, sigma / math.sqrt(2 * alpha), p, 10)
+    return even(p, free, (driven, OrnsteinUhlenbeck(alpha, sigma)), count=10, near=None)
 
 
 def difference(count: int, key: str, at: float) -> float:
@@ -38,15 +38,7 @@ def struck(count: int):
     return np.block([[still, one], [stiffness, 0.3 * (damping - one)]]), np.block([[still, still], [load, still]])
 
 
-def by_impulses(count: int) -> float:
-    free, driven = struck(count)
-    return kronecker.several(free, [], [], [(1.0, -0.4 * driven), (1.0, 0.2 * driven)], 2, 0.5)
-
-
-def three(seed: int = 20):
-    return np.random.default_rng(seed).standard_normal((2, 3, 3))
-
-
+THREE = matrices(*np.random.default_rng(20).standard_normal((2, 3, 3)), White(s=0.5))
 DENSE = (
     (0.16668973980979807, 0.23680414552986853, 0.16150317471122555),
     (0.15391505563304891, -0.3378594748085906, -0.8262245147008055),
@@ -96,18 +88,19 @@ ROWS = [
     ),
     *(
         Row(
-            matrices(*struck(count), Poisson(2.0, (-0.4, 0.2))),
+            problem,
             moment(2.0),
-            partial(by_impulses, count),
+            partial(by_moments, problem, 2, near=0.5),
             *(1e-12, 1e-8, f"Kronecker products of {count} masses under impulses"),
             slow=count > 2,
         )
         for count in (2, 12)
+        for problem in [matrices(*struck(count), Poisson(2.0, (-0.4, 0.2)))]
     ),
     Row(
-        matrices(*three(), White(s=0.5)),
+        THREE,
         moment(2.0, rtol=1e-3),
-        lambda: kronecker.white(three()[0], 0.5 * three()[1], 2),
+        partial(by_moments, THREE, 2),
         *(1e-11, 1e-10, "Kronecker products of three variables at a loose tolerance"),
     ),
 ]

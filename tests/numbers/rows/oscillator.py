@@ -7,10 +7,10 @@ import numpy as np
 
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator, make_mesh
 from fpsolve.model import Jump, Noise
-from tests.conftest import oracle_arguments
 from tests.kit import matrices, rates
 from tests.numbers.values import Row, index, moment, moments
-from tests.oracles import fourier_hermite, perturbation
+from tests.oracles import perturbation
+from tests.oracles.planar import series
 
 HERMITE = "Fourier-Hermite series"
 PAPER = NonGaussianNoise(D0=1.0, tau0=0.5, r0=0.95)
@@ -27,28 +27,12 @@ def elastic(epsilon: float, noise: Noise, c1: float = 0.0, omega: float = 1.0) -
     return Problem(paper(epsilon, 1.0, c1, omega), noise)
 
 
-def series(motion: VibroImpactOscillator, noise: Noise, p: float, harmonics: int = 10, polynomials: int = 30) -> float:
-    """Λ(p) by so many functions."""
-    if isinstance(noise, NonGaussianNoise):
-        given = {name: getattr(noise, name) for name in ("D0", "tau0", "r0")}
-        given |= {name: getattr(motion, name) for name in ("omega", "epsilon", "c1")}
-        return fourier_hermite.moment_lyapunov_bounded_noise(
-            **given, log_R=motion.log_impact_factor, p=p, harmonics=harmonics, gegenbauer=polynomials
-        )
-    return fourier_hermite.moment_lyapunov(
-        **oracle_arguments(motion, noise), p=p, harmonics=harmonics, hermite=polynomials
-    )
-
-
 def resolved(motion: VibroImpactOscillator, noise: Noise, p: float, size=(10, 30), rtol: float = 1e-8) -> Row:
     """The error stated is within rtol on the scale of Eq. (37)."""
     scale = perturbation.moment_scale(motion, noise, p)
     source = f"{HERMITE} {noise.kind} {motion.impact} rtol {rtol}"
-    known, doubt = (
-        partial(series, motion, noise, p, *size),
-        1e-15 * motion.omega,
-    )  # an eigenvalue of a matrix of that size
-    return Row(Problem(motion, noise), moment(p, rtol=rtol), known, doubt, rtol * scale, source)
+    problem, doubt = Problem(motion, noise), 1e-15 * motion.omega  # an eigenvalue of a matrix of that size
+    return Row(problem, moment(p, rtol=rtol), partial(series, problem, p, *size), doubt, rtol * scale, source)
 
 
 def white_limit(kappa: float = 0.25) -> float:

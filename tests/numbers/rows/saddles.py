@@ -10,14 +10,11 @@ from tests.kit import matrices
 from tests.numbers.by_problem import by_moments
 from tests.numbers.rows import even
 from tests.numbers.values import Row, moment
-from tests.oracles import filtered
-from tests.oracles.moment_hierarchy import ornstein_uhlenbeck_exponent, sine_wiener_exponent
 
 SADDLE, SKEW = [[1.0, 0.0], [0.0, -1.0]], [[0.5, 1.0], [0.3, -0.3]]
 TURN = [[0.0, -1.0], [1.0, 0.0]]
-FAST = [OrnsteinUhlenbeck(alpha=alpha, sigma=sigma) for alpha, sigma in even.LAWS]
 UNDER_TWO, UNDER_FILTER = (
-    matrices(even.SADDLE, even.ACROSS, FAST),
+    matrices(even.SADDLE, even.ACROSS, even.FAST),
     matrices(even.NODE, even.NODE_NOISE, Filter(*even.NODE_FILTER)),
 )
 
@@ -36,9 +33,9 @@ def turned(steady, rate: float, deviation: float):
 ROWS = [
     *(
         Row(
-            turned(steady, rate, deviation),
+            problem,
             moment(4.0),
-            partial(ornstein_uhlenbeck_exponent, steady, TURN, rate, deviation, 4, 24),
+            partial(by_moments, problem, 4, 24),
             *(1e-8, 1e-7, f"moment equations of a saddle {rate:g} {deviation:g}"),
         )
         for steady, rate, deviation in (
@@ -47,15 +44,17 @@ ROWS = [
             (SKEW, 0.01, 0.01),
             (SKEW, 0.01, 0.03),
         )
+        for problem in [turned(steady, rate, deviation)]
     ),
     *(
         Row(
-            matrices(steady, TURN, SineWiener(0.03, 0.02**0.5)),
+            problem,
             moment(4.0),
-            partial(sine_wiener_exponent, steady, TURN, 0.03, 0.02**0.5, 4, 16),
+            partial(by_moments, problem, 4),
             *(1e-10, 1e-7, "moment equations of a saddle under bounded noise"),
         )
         for steady in (SADDLE, SKEW)
+        for problem in [matrices(steady, TURN, SineWiener(0.03, 0.02**0.5))]
     ),
     *(
         Row(
@@ -71,7 +70,7 @@ ROWS = [
         Row(
             UNDER_FILTER,
             moment(float(p)),
-            partial(filtered.moment_lyapunov, even.NODE, even.NODE_NOISE, even.NODE_FILTER, p, 10),
+            partial(by_moments, UNDER_FILTER, p, 10),
             *(1e-9, 1e-7, "moment equations of a saddle under a filter"),
             slow=p == 6,
         )

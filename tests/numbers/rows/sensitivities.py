@@ -34,8 +34,7 @@ KINDS = (
 
 
 def made(kind, theta):
-    noise = kind(**theta, sizes=(-0.5, 0.7)) if kind is Poisson else kind(**theta)
-    return OrnsteinUhlenbeck(noise.alpha, noise.sigma) if hasattr(noise, "alpha") else noise
+    return kind(**theta, sizes=(-0.5, 0.7)) if kind is Poisson else kind(**theta)
 
 
 def value(kind, stiffness, damping, **theta):
@@ -43,8 +42,7 @@ def value(kind, stiffness, damping, **theta):
 
 
 def rows(kind, theta):
-    noise = kind(**theta, sizes=(-0.5, 0.7)) if kind is Poisson else kind(**theta)
-    problem = rates(SPRING, noise, **OWN)
+    problem = rates(SPRING, made(kind, theta), **OWN)
     for name in (*theta, *(OWN if kind in (White, Telegraph, Filter) else ())):
         key = f"system.{name}" if name in OWN else f"noise.{name}"
         for quantity in (closed_by(key, 2), *(() if kind is Filter else (by(key, 2.0),))):  # which takes a minute

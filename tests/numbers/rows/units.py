@@ -10,8 +10,8 @@ from fpsolve.exponent import critical_impact_factor, impact_rate
 from fpsolve.model import Telegraph, White
 from tests.kit import matrices, rates
 from tests.numbers.by_problem import by_moments
+from tests.numbers.second import even
 from tests.numbers.values import Row, exponent, moment, number, slope_by, variance_rate
-from tests.oracles import moment_hierarchy
 
 
 def spring(noise, k: float, b: float):
@@ -27,7 +27,7 @@ def moved(seed: int):
     """White noise in any coordinates and any unit of time, and Λ(4)."""
     rng = np.random.default_rng(seed)
     drift, noise = rng.normal(size=(2, 2)), rng.normal(size=(2, 2)) * 10 ** rng.uniform(-1.5, 2)
-    right = moment_hierarchy.white_noise_exponent(drift, [noise], 4)
+    right = even(4, drift, (noise, White(1.0)))
     basis, rate = np.diag([1.0, 10 ** rng.uniform(-7, 7)]) @ rng.normal(size=(2, 2)), 10 ** rng.uniform(-9, 12)
     inverse = np.linalg.inv(basis)
     return matrices(rate * basis @ drift @ inverse, math.sqrt(rate) * basis @ noise @ inverse, White(1.0)), rate * right
