@@ -273,7 +273,7 @@ class Code(Enum):
     ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: λ = 0 would need {symbol} = {value:.3g}"
 
     NOISE_MISFIT = (
-        "warning: near {name} the measured density is {relative:+.1%} off that of the best fit, and the fit is made to "
+        "warning: near {name} the density is {relative:+.1%} off that of the best fit, and the fit is made to "
         "have it; elsewhere it is off; take another kind of noise, or more terms"
     )
     AS_READ = "note: {text}"
@@ -281,7 +281,6 @@ class Code(Enum):
         "warning: the search for the parameters was stopped after {steps} steps, so that another noise may fit better; "
         "use fewer terms, or another kind"
     )
-    SPECTRUM_GAP = "note: nothing was measured from {low:.4g} to {high:.4g} rad/time"
     NO_SPECTRUM_ERROR = (
         "note: the errors of the measured values are not known, and are taken from how far each is from its "
         "neighbours; state how many averages they are of"

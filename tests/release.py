@@ -32,7 +32,7 @@ found = moment_lyapunov(free, 2.0).value[0]
 assert abs(found - 2 ** (1 / 3)) < 1e-9, found
 assert abs(lyapunov_exponent(free).value - 0.289308259834239) < 1e-8  # Airy functions, Halperin 1965
 """
-EXTRAS = [f"--extra={name}" for name in ("cluster", "pandas", "proof")]
+EXTRAS = [f"--extra={name}" for name in ("cluster", "proof")]
 COMMANDS = [
     ["--version"],
     ["schema"],

@@ -64,16 +64,16 @@ def _loaded(path: Path) -> FloatArray:
     content = read_bytes(path, _WORDS, MOST_BYTES)
     match path.suffix.lower():
         case ".npy":
-            from fpsolve.measured.tables import npy  # 12 ms
-
-            return np.asarray(npy(content))
+            found = np.load(path, mmap_mode="r", allow_pickle=False)
+            _look_at(found.shape)  # before it is read
+            return np.asarray(found)
         case ".csv":
             with warnings.catch_warnings(action="ignore"):  # of empty lines
                 return np.loadtxt(BytesIO(content), delimiter=",", ndmin=2, max_rows=MOST_MODES + 1)
         case ".mtx":
             from scipy.io import mmread  # 9 ms
 
-            found = mmread(BytesIO(content))
-            _look_at(found.shape)  # before a sparse one is filled
-            return np.asarray(found if isinstance(found, np.ndarray) else found.toarray())
+            matrix = mmread(BytesIO(content))
+            _look_at(matrix.shape)  # before a sparse one is filled
+            return np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
     raise Unreadable(f"is of a kind {path.suffix or 'without ending'}")

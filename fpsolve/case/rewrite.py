@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, MutableMapping, Sequence
+from collections.abc import Collection, Mapping, MutableMapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -22,7 +22,7 @@ def rewritten(
     values: Mapping[str, float | str] = MappingProxyType({}),
     *,
     without: Collection[str] = (),
-    lists: Mapping[str, Sequence[object]] = MappingProxyType({}),
+    others: Mapping[str, object] = MappingProxyType({}),
     more: str = "",
 ) -> str:
     """The text of a case with other values, and with what the command line has changed.
@@ -33,14 +33,14 @@ def rewritten(
         folder: where the file will be.
         values: of the parameters by their keys, such as "oscillator.c1".
         without: the sections that are left out; empty ones are, too.
-        lists: of other keys, such as "moments.p".
+        others: of other keys, such as "moments.p".
         more: what stands at its end.
     """
     data = {name: each for name, each in _data(case, folder).items() if name not in without and each not in ({}, [])}
     for key, value in values.items():
         _set(data, key, value)
-    for key, each in lists.items():
-        put(data, key, [*each])
+    for key, each in others.items():
+        put(data, key, each)
     return _with_data(case.text, data) + more
 
 
@@ -49,8 +49,9 @@ def _data(case: Case, folder: Path) -> dict[str, object]:
     document = document_of(case.text)
     for change in case.overrides:
         document.override(change, change)
-    if case.mesh.file:
-        put(document.data, "mesh.file", Path(os.path.relpath(case.path.parent / case.mesh.file, folder)).as_posix())
+    for key in ("mesh.file", "vary.file"):
+        if isinstance(file := get(document.data, key), str):
+            put(document.data, key, Path(os.path.relpath(case.path.parent / file, folder)).as_posix())
     return document.data
 
 

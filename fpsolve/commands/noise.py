@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -17,12 +16,12 @@ from fpsolve.commands.options import OPTIONS, Count, print_in_one_line
 from fpsolve.errors import FpsolveError
 from fpsolve.fem.factors import one_thread
 from fpsolve.files import writable, write_json, write_text
-from fpsolve.measured import Record, Spectrum, read_modes, read_record, read_spectrum
+from fpsolve.measured import Record, Spectrum, read_record, read_spectrum
 from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
-from fpsolve.measured.reading import Mode, checked_scale
-from fpsolve.measured.signals import SIGNALS, factor_of, powers
+from fpsolve.measured.reading import checked_scale
+from fpsolve.measured.signals import SIGNALS, factor_of
 from fpsolve.measured.spectrum import UNITS
-from fpsolve.measured.units import GRAVITY
+from fpsolve.measured.weak import GRAVITY
 from fpsolve.messages import escaped
 from fpsolve.results.folders import own_folder
 from fpsolve.results.noise import case_of, noise_sections, summary
@@ -37,7 +36,7 @@ from fpsolve.solve.noise import (
     natural_frequencies,
     refuse_wrong_case,
 )
-from fpsolve.tell.noise import Convention, draw_noise, show
+from fpsolve.tell.noise import draw_noise, show
 from fpsolve.tell.progress import SOLVES, Phase
 from fpsolve.tell.solved import last_line
 from fpsolve.tell.terminal import print_blocks
@@ -49,27 +48,27 @@ class Statement:
     """The options of `fpsolve noise`.
 
     Attributes:
-        record: A record of values over time instead, also .wav; beside a spectrum its variance is compared with it.
+        record: A record of values over time instead, also .wav.
         per: The unit of the frequencies; if omitted that of the file, which must state it.
         sided: Whether the integral over f > 0 is the variance, one, or half of it, two.
         frequency: Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.
         damping_ratio: Damping as a share of critical damping: states an oscillator, whose verdict is told.
         restitution: Speed after a bounce off its wall over that before; no wall if omitted.
         case: A case instead, whose noise is replaced.
-        modes: A table of natural frequencies and damping ratios, Fn and Xi, as pyOMA writes it.
-        mode: A row of this table; of two modes twice.
         noise_in: Where the noise is; stiffness if neither this nor --of is stated.
         length: Length of the pendulum in m, from which its natural frequency follows.
         gm: Mean metacentric height in m, for --of height.
         kind: The kind of noise.
         terms: How many noises of the kind are added, 1 or 2.
         column: The column of values, if the file has several.
-        rate: Values of the record per second, if the file states no times.
+        rate: Values of the record per second, in place of the times of the file.
         over: The column of frequencies or times, if its name does not tell.
-        unit: The unit of the signal, such as g, or of its density, if the file states none.
+        unit: The unit of the signal, such as g, or of its density, in place of that of the file.
+        time_unit: The unit of the times of a record, such as ms, in place of that of the file.
         scale: What the signal is multiplied by; a density by its square.
         skip: Rows of the file that are left out at its beginning; of a text lines.
-        row: Which of several spectra in the rows of a file; their mean if omitted.
+        names: Names of the columns of a text with their units, such as "t (s),a (g)", in place of its own.
+        by: How the values of a record follow each other in a text.
         log_log: The file has break points, with straight lines in the logarithms between.
         parameters: Those of the named density, such as Hs=2,Tp=9.
         segment: Seconds of a segment of a record; as the natural frequency needs if omitted.
@@ -85,8 +84,6 @@ class Statement:
     damping_ratio: float | None = None
     restitution: float | None = None
     case: Path | None = None
-    modes: Path | None = None
-    mode: list[Count] | None = None
     noise_in: Literal["stiffness", "damping"] | None = None
     of: Annotated[
         Literal["stiffness", "damping", "acceleration", "height"] | None,
@@ -103,9 +100,11 @@ class Statement:
     rate: float | None = None
     over: str | None = None
     unit: str | None = None
+    time_unit: str | None = None
     scale: float = 1.0
     skip: Count = 0
-    row: Count | None = None
+    names: str = ""
+    by: Literal["columns", "rows"] = "columns"
     log_log: bool = False
     named: Annotated[
         str | None,
@@ -122,7 +121,8 @@ class Statement:
 
 
 NOTHING_STATED = Statement()
-OF_SPECTRA, OF_RECORDS, OF_FILES = ("sided", "averages", "row", "log_log"), ("segment", "rate"), ("over", "skip")
+OF_SPECTRA, OF_RECORDS = ("sided", "averages", "log_log"), ("segment", "rate", "time_unit", "by")
+OF_FILES = ("over", "skip", "names")
 """Options for files alone: of one kind, of any."""
 RANGES = {
     "gm": (0.0, math.inf, "> 0, in m"),
@@ -149,6 +149,8 @@ def measurement_of(
     has_file = bool(spectrum or stated.record)
     if stated.noise_in not in (None, place):
         raise FpsolveError(f"got --of {of} and --noise-in {stated.noise_in}; {of} is in the {place}; leave one out")
+    if spectrum and stated.record:
+        raise FpsolveError(f"got {spectrum} and --record {stated.record}, a spectrum and a record; leave out one")
     if not source.name:
         raise FpsolveError("name a file, that of a spectrum or of a record by --record, or a density by --named")
     for options, is_wrong, told in (
@@ -156,18 +158,17 @@ def measurement_of(
         (["parameters"], not stated.named, "are those of --named"),
         ([*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column"], not has_file, "is for a file, and a density was named"),
         (OF_SPECTRA, not spectrum, "is for a spectrum, and a record was named"),
-        (OF_RECORDS[: 1 if stated.record else 2], spectrum, "is for a record, and a spectrum was named"),
+        (OF_RECORDS, spectrum, "is for a record, and a spectrum was named"),
         (["gm"], of != "height", "belongs to --of height"),
         (["length"], of != "acceleration", "is for --of acceleration"),
-        (["mode"], not stated.modes, "is for the table that --modes names"),
-        (["damping_ratio", "restitution", "modes"], case, "is of the system, which --case states"),
+        (["damping_ratio", "restitution"], case, "is of the system, which --case states"),
     ):
         for option in options:
             if is_wrong and given[option] != vars(NOTHING_STATED)[option]:
                 raise FpsolveError(f"--{option.replace('_', '-')} {told}; leave it out")
     if of == "height" and stated.gm is None:
         raise FpsolveError("--of height needs --gm; state the mean metacentric height in m by --gm")
-    if stated.restitution is not None and stated.damping_ratio is None and not stated.modes:
+    if stated.restitution is not None and stated.damping_ratio is None:
         raise FpsolveError("--restitution needs the damping of the oscillator, too; state --damping-ratio")
     for option, (low, high, accepted) in RANGES.items():
         for value in given[option] if isinstance(given[option], list) else [given[option]]:
@@ -181,29 +182,20 @@ def measurement_of(
     if stated.named:
         return _named(stated.named, stated, of, 2 * modes.omega[0]), wanted, source
 
-    def chosen(*options: str) -> dict[str, Any]:
-        return {option: given[option] for option in options}
-
-    how, variance = chosen(*OF_FILES, "unit", "scale"), None
+    how = {option: given[option] for option in ("column", "unit", "scale", *OF_FILES)}
     if stated.record:
-        record = read_record(stated.record, of=of, **chosen("rate", "column"), **({} if spectrum else how))
-        if not spectrum:
-            return record, wanted, source
-        variance, how["column"] = float(record.values.var()), None
-    how = chosen("per", "column", *OF_SPECTRA) | how
-    return read_spectrum(source, of=of, variance=variance, **how), wanted, source
+        how_fast = {option: given[option] for option in ("rate", "time_unit", "by")}
+        return read_record(source, of=of, **how_fast, **how), wanted, source
+    more = {option: given[option] for option in ("per", *OF_SPECTRA)}
+    return read_spectrum(source, of=of, **more, **how), wanted, source
 
 
 def _named(name: str, stated: Statement, of: str, near: float) -> Spectrum:
     """The density that is named, in the unit of its signal."""
-    signal = SIGNALS[of]
     try:
         found = named_spectrum(name, near, **parameters_of(stated.parameters))
         unit = stated.unit or NAMED[name].unit
-        if stated.scale == 1.0 and powers(unit) not in [powers(each) for each in signal.units]:
-            remedy = f"state by --scale how much of this is in one {unit}"
-            raise ValueError(f"{name} is in {unit}, and {signal.words} in {signal.unit}; {remedy}")
-        factor = factor_of(of, powers(unit), unit) if stated.scale == 1.0 else checked_scale(stated.scale)
+        factor = factor_of(unit, SIGNALS[of].unit) if stated.scale == 1.0 else checked_scale(stated.scale)
     except ValueError as error:
         raise FpsolveError(f"--named: {error}") from None
     return found.scaled(factor)
@@ -211,13 +203,11 @@ def _named(name: str, stated: Statement, of: str, near: float) -> Spectrum:
 
 def _modes(stated: Statement, case: Case | None) -> Modes:
     """The natural frequencies and the damping by the one option that states them."""
-    table, zeta = _rows(stated), stated.damping_ratio
     unit = UNITS[stated.per or "Hz"]
     found = {
         "--frequency": [unit * each for each in stated.frequency or ()],
         "--length": [math.sqrt(GRAVITY / stated.length)] if stated.length else [],
         "--case": [*natural_frequencies(case.system)[:2]] if case else [],
-        "--modes": [2 * math.pi * each.frequency for each in table],
     }
     if case and not found["--case"]:
         raise FpsolveError(f"{case.path}: does not oscillate without noise, so that no frequency matters most")
@@ -227,30 +217,14 @@ def _modes(stated: Statement, case: Case | None) -> Modes:
         if omega
     }
     if not told:
-        raise FpsolveError("state the natural frequency by --frequency, or a system by --case or --modes")
+        raise FpsolveError("state the natural frequency by --frequency, or a system by --case")
     if len(told) > 1:
         text = " and ".join(f"{option} {words}" for option, words in told.items())
         raise FpsolveError(f"got {text}; leave out one of {' and '.join(told)}")
-    [option] = told
-    omega = found[option]
+    [omega] = filter(None, found.values())
     if len(omega) > 2:
-        raise FpsolveError(
-            f"{stated.modes or option} has {len(omega)} modes; choose one or two by --mode, or as many --frequency"
-        )
-    known = zeta if zeta is not None else table[0].damping_ratio if table else math.nan
-    return Modes(tuple(omega), known, stated.restitution)
-
-
-def _rows(stated: Statement) -> Sequence[Mode]:
-    """The rows of the table of modes that are chosen; none without a table."""
-    if stated.modes is None:
-        return ()
-    rows = read_modes(stated.modes)
-    for number in stated.mode or ():
-        if not 1 <= number <= len(rows):
-            must = f"must be from 1 to {len(rows)}, the number of its row"
-            raise FpsolveError(f"{stated.modes}: got --mode {number}; {must}")
-    return [rows[number - 1] for number in stated.mode] if stated.mode else rows
+        raise FpsolveError(f"got {len(omega)} natural frequencies; state one or two by --frequency")
+    return Modes(tuple(omega), math.nan if stated.damping_ratio is None else stated.damping_ratio, stated.restitution)
 
 
 def noise(
@@ -279,7 +253,7 @@ def noise(
     start = monotonic()
     case = OPTIONS.load([stated.case])[0] if stated.case else None
     data, wanted, source = measurement_of(spectrum, stated, case)
-    shown = Convention(stated.per or "Hz", stated.sided or "one")
+    per = stated.per or "Hz"
     folder, phase = out / source.name, Phase(source.stem, "solving", STEPS_OF_A_FIT, SOLVES)
     try:
         with one_thread(), OPTIONS.watch(is_json=json).bar(phase) as progress:
@@ -291,12 +265,12 @@ def noise(
         write_json(folder / "noise.json", summary(outcome, source))
         if text:
             write_text(folder / "noise.toml", text)
-        draw_noise(outcome, source, shown, folder)
+        draw_noise(outcome, source, per, folder)
     if json:
         print_in_one_line(folder / "noise.json")
     else:
+        print_blocks(show(outcome, source, per))
         print(escaped(noise_sections(outcome).strip()), end="\n\n")
-        print_blocks(show(outcome, source, shown))
         names = ", ".join(name for name in FILES if text or name != "noise.toml")
         print_blocks([last_line(folder, names, monotonic() - start)])
     return NOT_CONVERGED if outcome.failure is not None else 0

@@ -11,6 +11,16 @@ gᵢ = ∂ ln Sᵢ/∂θ the estimate has the covariance A⁻¹BA⁻¹, A = Σ w
 Sᵢ(θ) of a record is the mean of its estimate: the transform of w⋆w(t) C(t), C the autocovariance of ξ and w the window.
 So it has neither the bias of aliases nor that of leakage. There B has the correlation of neighbouring frequencies too.
 Of bounded noise, which is not Gaussian, B is that of segments of simulated records of the fitted noise.
+
+Noise of Eq. (7) with bounded tails is fitted to a record by its moments and its quadratic variation.
+
+With b = 1 − r₀ > 0 the stationary density (9) is that of (1 − ξ²/h²)^(1/b), with
+
+    kurtosis κ = 3(2a + 3)/(2a + 5), a = 1/b,   so that a = (5κ − 9)/(2(3 − κ)),   r₀ = 1 − 1/a,
+    variance V = 2(D₀/τ₀)/(5 − 3r₀),   and E(dξ)² = 2D₀/τ₀² dt, the quadratic variation.
+
+τ₀ is D₀/τ₀ over D₀/τ₀². Of a record with the step Δ, q(Δ) = E(ξ(t + Δ) − ξ(t))²/(2Δ) is D₀/τ₀² + O(Δ), and
+(8q(Δ) − 6q(2Δ) + q(4Δ))/3 is it up to O(Δ³). What a sensor adds to the record as noise of its own spoils this.
 """
 
 from __future__ import annotations
@@ -22,20 +32,23 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import correlate1d
 from scipy.optimize import least_squares, nnls
 
-from fpsolve.arrays import FloatArray, shown
-from fpsolve.measured.kinds import KINDS, Kind
-from fpsolve.measured.spectrum import MOST_AVERAGES, Record, Spectrum, bracketed, gaps, welch_variance
-from fpsolve.measured.weak import Where, frequencies_that_matter
+from fpsolve.arrays import FloatArray, is_whole, shown
+from fpsolve.measured.kinds import KINDS, Kind, Values
+from fpsolve.measured.spectrum import MOST_AVERAGES, Record, Segments, Spectrum
+from fpsolve.measured.weak import Where, checked_choice, frequencies_that_matter
 from fpsolve.messages import Code, Message
-from fpsolve.model import Noise, Noises
+from fpsolve.model import Noise, NonGaussianNoise
+from fpsolve.model.noises.several import noises_of
 
 FLOOR, WIDTH = 0.02, 0.3
 """The weight far from the frequencies that matter, and how far in ln ω the weight has fallen by half."""
 NAMES = ("first", "second")
 """Of the noises of a sum."""
-MOST_TERMS = len(NAMES)
+OF_HANN = 1 / 36, 4 / 9, 1.0, 4 / 9, 1 / 36
+"""The correlation of a periodogram of Gaussian noise with those at neighbouring frequencies, by Hann's window."""
 AT_END = 1e-4
 """Below the logarithm of its largest value a parameter counts as fixed there."""
 UNTOLD = 1e-8
@@ -50,8 +63,8 @@ MOST_SEGMENT = 0.4
 """Share of a record that a segment has at most, so that there are four that overlap by half."""
 LEAST_SAMPLES = 16
 """In a segment."""
-MOST_STEPS, MORE_STEPS = 100, 2000
-"""Evaluations of a search, and of one that goes on where this did not suffice."""
+MOST_STEPS = 2000
+"""Evaluations of a search."""
 MISFIT, SHARE = 3.0, 0.02
 """Standard errors, and a share, by which a fit may be off where it matters before that is said."""
 EXACT = 1e-3
@@ -60,6 +73,11 @@ MEDIAN = 2.73
 """Of the squares of second differences of independent normal numbers, over their variance."""
 PASSING = 100.0
 """How much more than all other values together a density counts that a fit must have."""
+BLOCKS = 40
+"""Of a record, whose means tell the errors of moments."""
+LEAST_TIMES = 20 * BLOCKS
+LONGEST_STEP = 0.3
+"""Of V/(D₀/τ₀²), after which C = V has fallen by its first slope: D₀/τ₀² is then wrong by a third of its cube."""
 
 
 class Misfit(NamedTuple):
@@ -84,7 +102,8 @@ class NoiseFit:
 
     Attributes:
         parts: the independent noises whose sum ξ is.
-        parameters: the values that were fitted, by the keys below "noise." of a `Problem`: "alpha", or "first.alpha".
+        names: of the parameters of each part that were fitted, such as "alpha".
+        parameters: their values by the keys below "noise." of a `Problem`: "alpha", or "first.alpha".
         errors: their standard errors, by the same keys.
         covariance: in the order of the keys, shape (k, k).
         misfit: at each frequency that matters.
@@ -93,21 +112,31 @@ class NoiseFit:
     """
 
     parts: tuple[Noise, ...]
-    parameters: Mapping[str, float]
+    names: tuple[str, ...]
     covariance: FloatArray
     misfit: tuple[Misfit, ...]
     spectrum: Spectrum
     messages: tuple[Message, ...] = ()
 
     @property
+    def parameters(self) -> Mapping[str, float]:
+        parts = zip([f"{name}." for name in NAMES] if len(self.parts) > 1 else [""], self.parts, strict=True)
+        return {prefix + name: float(noise.values[name]) for prefix, noise in parts for name in self.names}
+
+    @property
+    def values(self) -> FloatArray:
+        """Those of the parameters, shape (k,)."""
+        return np.array([*self.parameters.values()])
+
+    @property
     def errors(self) -> Mapping[str, float]:
-        variances = np.maximum(np.diag(self.covariance), 0.0)
-        return dict(zip(self.parameters, np.sqrt(variances).tolist(), strict=True))
+        found = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist()
+        return dict(zip(self.parameters, found, strict=True))
 
     @cached_property
     def noise(self) -> Noise:
         """The noise for a `Problem`; a sum has the names "first" and "second"."""
-        return self.parts[0] if len(self.parts) == 1 else Noises(tuple(zip(NAMES, self.parts, strict=False)))
+        return noises_of(dict(zip(NAMES, self.parts, strict=False)))
 
     def spectral_density(self, omega: float) -> float:
         """S(ω) of the sum."""
@@ -116,20 +145,14 @@ class NoiseFit:
     def scaled(self, factor: float) -> NoiseFit:
         """The fit of the signal times a factor, such as `of_relative_stiffness`; its misfits and messages stay."""
         sizes = abs(factor) ** self.powers
-        parameters = {key: value * by for (key, value), by in zip(self.parameters.items(), sizes, strict=True)}
         covariance = self.covariance * np.outer(sizes, sizes)
-        return replace(self.at(parameters), covariance=covariance, spectrum=self.spectrum.scaled(factor))
+        return replace(self.at(self.values * sizes), covariance=covariance, spectrum=self.spectrum.scaled(factor))
 
     @property
     def powers(self) -> FloatArray:
         """The power of a factor of ξ by which each parameter changes, shape (k,)."""
-        known, kinds = {"sigma": 1.0, "s": 1.0, "mu": 1.0, "D0": 2.0}, dict(zip(NAMES, self.parts, strict=False))
-
-        def power(key: str) -> float:
-            part, _, name = key.rpartition(".")
-            return known[name] if name in kinds[part or NAMES[0]].of_xi else 0.0
-
-        return np.array([power(key) for key in self.parameters])
+        sizes = [{"D0": 2.0}.get(name, 1.0) * (name in self.parts[0].of_xi) for name in self.names]
+        return np.array(sizes * len(self.parts))
 
     @property
     def off(self) -> float:
@@ -137,58 +160,51 @@ class NoiseFit:
         squares = [each.relative**2 - each.error**2 for each in self.misfit]
         return float(np.sqrt(np.max([0.0, *squares])))  # not a number where one is not
 
-    def at(self, values: Mapping[str, float]) -> NoiseFit:
-        """The same with other values of some parameters, by their keys."""
-        parameters = {**self.parameters, **values}
-        own = {name: dict[str, float]() for name in NAMES}
-        for key, value in parameters.items():
-            part, _, name = key.rpartition(".")
-            own[part or NAMES[0]][name] = value
-        parts = tuple(noise.at(own[name]) for name, noise in zip(NAMES, self.parts, strict=False))
-        return replace(self, parts=parts, parameters=parameters)
-
-
-class _Cut(NamedTuple):
-    """Segments of a record that overlap by half: their window, of the length of one, and the step of time."""
-
-    window: FloatArray
-    step: float
-
-    @property
-    def hop(self) -> int:
-        return self.window.size - self.window.size // 2
-
-    @property
-    def inside(self) -> slice:
-        """Of the frequencies: neither those on which the mean acts nor the highest."""
-        return slice(2, self.window.size // 2)
-
-    @property
-    def inflation(self) -> float:
-        """n Σw⁴/(Σw²)²: by so much the variance of a sum over frequencies is larger, as neighbours are correlated."""
-        return float(self.window.size * np.sum(self.window**4) / np.sum(self.window**2) ** 2)
-
-    def periodograms(self, values: FloatArray) -> FloatArray:
-        """Of each segment, one a row."""
-        length = self.window.size
-        starts = range(0, values.size - length + 1, self.hop)
-        rows = [abs(np.fft.rfft(self.window * values[i : i + length])[self.inside]) ** 2 for i in starts]
-        return self.step * np.array(rows, dtype=float)
+    def at(self, values: FloatArray) -> NoiseFit:
+        """The same with other values of the parameters, in the order of their keys, shape (k,)."""
+        rows = values.reshape(len(self.parts), -1).tolist()
+        parts = [noise.at(dict(zip(self.names, row, strict=True))) for noise, row in zip(self.parts, rows, strict=True)]
+        return replace(self, parts=tuple(parts))
 
 
 class _Data(NamedTuple):
-    """Values, of how many each is the mean, and what `expected` makes of kinds: Sᵢ(θ).
+    """What is fitted.
 
-    Of a record `variance` is that of a mean over its square, and `record` how it is cut. Where the errors of values are
-    not known, their number follows from how far each is from its neighbours.
+    Attributes:
+        spectrum: of which all but ω = 0 counts.
+        omega: ω > 0, shape (n,).
+        values: Ŝᵢ, shape (n,).
+        number: of how many periodograms each is the mean; where errors of values are not known, it follows from how far
+            each is from its neighbours.
+        error: the relative standard error of each.
+        expected: Sᵢ of one noise by its kind and parameters.
+        correlation: of a value with its neighbours and itself.
+        segments: of a record.
+        weights: wᵢ, shape (n,).
     """
 
+    spectrum: Spectrum
     omega: FloatArray
     values: FloatArray
     number: FloatArray
-    expected: Callable[[Kind, FloatArray], FloatArray]
-    variance: float
-    record: _Cut | None
+    error: FloatArray
+    expected: Callable[[Kind, Values], FloatArray]
+    correlation: Sequence[float] = (1.0,)
+    segments: Segments | None = None
+    weights: FloatArray = np.ones(1)
+
+    def sum(self, kind: Kind, fitted: FloatArray) -> FloatArray:
+        """Sᵢ of several noises of a kind, by all parameters that are fitted."""
+        return np.sum([self.expected(kind, each) for each in kind.values(fitted)], axis=0)
+
+
+class _Found(NamedTuple):
+    """The parameters of noises of a kind where the deviance is least; whether the search was stopped before its end."""
+
+    kind: Kind
+    values: FloatArray
+    deviance: float
+    is_stopped: bool
 
 
 def fit_noise(
@@ -218,42 +234,39 @@ def fit_noise(
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.
     """
     matter = frequencies_that_matter(frequency, second_frequency, noise_in)
-    if kind not in KINDS:
-        raise ValueError(f"got kind = {shown(kind)}; must be one of {', '.join(KINDS)}")
-    if isinstance(terms, bool) or terms not in range(1, MOST_TERMS + 1):
-        raise ValueError(f"got terms = {shown(terms)}; must be a whole number from 1 to {MOST_TERMS}")
+    kinds = KINDS[checked_choice("kind", kind, KINDS)]
+    if not is_whole(terms, 1, len(NAMES)):
+        raise ValueError(f"got terms = {shown(terms)}; must be a whole number from 1 to {len(NAMES)}")
     if isinstance(data, Spectrum):
-        spectrum, used = data, _of_spectrum(data)
+        used = _of_spectrum(data)
     elif isinstance(data, Record):
-        length = _segment(data, segment, matter)
-        spectrum, used = data.spectrum(length), _of_record(data, length)
+        used = _of_record(data, _segment(data, segment, matter))
     else:
         raise TypeError(f"got {shown(data)}; must be a Spectrum or a Record")
-    _refuse_far(spectrum, matter)
-    weights = _weights(used.omega, [*matter.values()], 2 * frequency)
+    _refuse_far(used.spectrum.frequencies, matter)
+    # 1 at a frequency that matters, and FLOOR far from all of them
+    away = [abs(np.log(used.omega / each)) if each else used.omega / (2 * frequency) for each in matter.values()]
+    used = used._replace(weights=FLOOR + (1 - FLOOR) / (1 + (np.min(away, axis=0) / WIDTH) ** 2))
     places, errors = zip(*(_place(at, used) for at in matter.values()), strict=True)
 
     def best(passed: Sequence[FloatArray]) -> NoiseFit:
-        fits = [_fitted(used, [family] * terms, weights, passed) for family in KINDS[kind]]
+        fits = [_fitted(used, each, terms, passed) for each in kinds]
         # more parameters must lower the deviance by ln n each, as in Bayes' criterion
-        families, theta, _, is_stopped = min(
-            zip([[family] * terms for family in KINDS[kind]], *zip(*fits, strict=True), strict=True),
-            key=lambda each: each[2] + len(each[1]) * math.log(len(used.values)),
-        )
-        off = np.dot(places, used.values) / np.dot(places, _sum(used, families, theta)) - 1
-        misfit = tuple(Misfit(*each) for each in zip(matter, matter.values(), off.tolist(), errors, strict=True))
-        found = _told(used, families, theta, weights, misfit, spectrum)
-        stopped = (Message(Code.FIT_STOPPED, steps=MORE_STEPS),) if is_stopped else ()
-        return replace(found, messages=(*stopped, *found.messages))
+        found = min(fits, key=lambda each: each.deviance + len(each.values) * math.log(len(used.values)))
+        off = np.dot(places, used.values) / np.dot(places, used.sum(found.kind, found.values)) - 1
+        misfit = tuple(map(Misfit, matter, matter.values(), off.tolist(), errors))
+        return _told(used, found, misfit)
 
     found = best([])
     if not _off(found, EXACT):
         return found
     again = best(places)
     if left := _off(again, SHARE):
-        text = "that was measured; take another kind, such as filter, or two terms"
-        raise ValueError(f"no {kind} noise found has the density near {left[0].name} {text}")
-    size = 0.5 * max(errors) * again.powers * np.array([*again.parameters.values()])
+        raise ValueError(
+            f"no {kind} noise found has the density near {left[0].name} that was measured; take another kind, such as "
+            "filter, or two terms"
+        )
+    size = 0.5 * max(errors) * again.powers * again.values
     told = [Message(Code.NOISE_MISFIT, name=each.name, relative=each.relative) for each in _off(found, SHARE)]
     return replace(again, covariance=again.covariance + np.outer(size, size), messages=(*told, *again.messages))
 
@@ -283,8 +296,8 @@ def _place(at: float, data: _Data) -> tuple[FloatArray, float]:
         count = 2 * count // 3
     weights = np.zeros_like(data.omega)
     weights[near] = np.maximum(inverse[-1], 0)
-    inflation = 1.0 if data.record is None else data.record.inflation
-    return weights, math.sqrt(inflation * np.sum(weights**2 / data.number)) if number < MOST_AVERAGES else 0.0
+    variance = sum(data.correlation) * float(np.sum(weights**2 / data.number))
+    return weights, math.sqrt(variance) if number < MOST_AVERAGES else 0.0
 
 
 def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) -> int:
@@ -296,8 +309,8 @@ def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) 
     n, lowest = record.values.size, min(each for each in matter.values() if each > 0)
     periods = lowest * record.duration / (2 * math.pi)
     if stated is not None:
-        if not LEAST_SAMPLES * record.step <= stated <= MOST_SEGMENT * record.duration:
-            low, high = LEAST_SAMPLES * record.step, MOST_SEGMENT * record.duration
+        low, high = LEAST_SAMPLES * record.step, MOST_SEGMENT * record.duration
+        if not low <= stated <= high:
             raise ValueError(
                 f"got segment = {stated:g}; must be from {low:.4g} to {high:.4g}, in the unit of its times"
             )
@@ -308,229 +321,204 @@ def _segment(record: Record, stated: float | None, matter: Mapping[str, float]) 
             f"{PERIODS / MOST_SEGMENT:g}; "
             "record for longer, or correct the natural frequency, its unit, or --rate"
         )
-    return max(record.segment_length(), math.ceil(PERIODS / periods * n))
+    return max(record.usual_segment, math.ceil(PERIODS / periods * n))
 
 
-def _refuse_far(spectrum: Spectrum, matter: Mapping[str, float]) -> None:
-    omega = spectrum.frequencies
+def _refuse_far(omega: FloatArray, matter: Mapping[str, float]) -> None:
+    """Raise `ValueError` where a frequency that matters is not between two neighbours a quarter of it apart."""
     for name, target in matter.items():
-        near = omega[0] <= 0.1 * max(matter.values()) if target == 0 else bracketed(omega, target)
-        if not near:
-            k = int(np.argmin(abs(omega - target)))
-            where, nearest = (f"{each:.4g} rad/time ({each / (2 * math.pi):.4g} cycles)" for each in (target, omega[k]))
+        low, high = omega[omega <= target * (1 + 1e-9)], omega[omega >= target * (1 - 1e-9)]
+        near = min(high, default=math.inf) - max(low, default=-math.inf) <= 0.25 * target
+        if not (near if target else omega[0] <= 0.1 * max(matter.values())):
+            nearest = omega[np.argmin(abs(omega - target))]
+            where = f"{name} = {target:.4g} rad/time ({target / (2 * math.pi):.4g} cycles)" if target else "0"
             raise ValueError(
-                f"nothing was measured near {f'{name} = {where}' if target else '0'}, which stability depends on; the "
-                f"nearest point is {nearest}; measure there, or correct the natural frequency or its unit"
+                f"nothing was measured near {where}, which stability depends on; the nearest point is {nearest:.4g} "
+                f"rad/time ({nearest / (2 * math.pi):.4g} cycles); measure there, or correct the natural frequency or "
+                "its unit"
             )
 
 
-def _weights(omega: FloatArray, matter: Sequence[float], scale: float) -> FloatArray:
-    """1 at a frequency that matters, and `FLOOR` far from all of them."""
-    near = [
-        1 / (1 + (omega / (WIDTH * scale)) ** 2) if target == 0 else 1 / (1 + (np.log(omega / target) / WIDTH) ** 2)
-        for target in matter
-    ]
-    return FLOOR + (1 - FLOOR) * np.max(near, axis=0)
-
-
 def _of_spectrum(data: Spectrum) -> _Data:
-    number, omega = np.full_like(data.density, MOST_AVERAGES), data.frequencies
-    if data.relative_error is not None:
-        number = data.relative_error**-2
-    elif not data.is_formula:
-        number /= 1 + MOST_AVERAGES * np.median(np.diff(np.log(data.density), 2) ** 2) / MEDIAN
-    positive = omega > 0
-    return _Data(
-        omega[positive],
-        data.density[positive],
-        number[positive],
-        lambda kind, theta: kind.density(omega[positive], theta),
-        math.nan,
-        None,
-    )
+    omega, density, error = data.frequencies, data.density, data.relative_error
+    if error is None:
+        scatter = 0.0 if data.is_formula else float(np.median(np.diff(np.log(density), 2) ** 2)) / MEDIAN
+        error = np.full_like(density, math.sqrt(1 / MOST_AVERAGES + scatter))
+    kept = omega > 0
+    omega, error = omega[kept], error[kept]
+    return _Data(data, omega, density[kept], error**-2, error, lambda kind, values: kind.density(omega, **values))
 
 
 def _of_record(record: Record, length: int) -> _Data:
-    """Periodograms of segments with Hann's window that overlap by half."""
-    window = np.hanning(length + 1)[:-1]
-    window /= math.sqrt(float(window @ window))
-    cut = _Cut(window, record.step)
-    segments = cut.periodograms(record.values)
-    omega: FloatArray = np.asarray(2 * math.pi * np.fft.rfftfreq(length, record.step)[cut.inside], dtype=float)
-    size = 2 * length
-    lags = np.asarray(np.fft.irfft(abs(np.fft.rfft(window, size)) ** 2, size)[:length], dtype=float)
+    """Its spectrum by segments of a length."""
+    spectrum, segments, size = record.spectrum(length), Segments(length, record.step), 2 * length
+    lags = np.fft.irfft(abs(np.fft.rfft(segments.window, size)) ** 2, size)[:length]
+    lags *= 2 * record.step
     lags[0] *= 0.5  # as C(0) stands once in 2 Re Σ
-    t = np.asarray(record.step * np.arange(length), dtype=float)
+    t = record.step * np.arange(length)
 
-    def expected(kind: Kind, theta: FloatArray) -> FloatArray:
-        found = (
-            2 * record.step * np.fft.rfft(np.multiply(lags, kind.covariance(t, theta), dtype=float)).real[cut.inside]
-        )
-        return np.asarray(np.maximum(found, 1e-300), dtype=float)
+    def expected(kind: Kind, values: Values) -> FloatArray:
+        return np.maximum(np.fft.rfft(lags * kind.covariance(t, **values)).real[segments.inside], 1e-300)
 
-    number, variance = np.full(omega.size, float(len(segments))), welch_variance(record.values.size, length)
-    return _Data(omega, segments.mean(axis=0), number, expected, variance, cut)
+    number = 1.0 + (record.values.size - length) // segments.hop
+    omega, error = spectrum.frequencies, np.asarray(spectrum.relative_error, dtype=float)
+    return _Data(spectrum, omega, spectrum.density, np.full_like(omega, number), error, expected, OF_HANN, segments)
 
 
-def _sum(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
-    """Σ of Sᵢ of the parts, by the logarithms of all parameters."""
-    total, k = np.zeros_like(data.omega), 0
-    for family in families:
-        total += data.expected(family, np.exp(theta[k : k + len(family.names)]))
-        k += len(family.names)
-    return total
+def _start(data: _Data, kind: Kind, terms: int) -> FloatArray:
+    """The logarithms of the parameters of the sum Σ a² S of candidates with a² ≥ 0 that is nearest, relatively.
 
-
-def _start(data: _Data, families: Sequence[Kind], weights: FloatArray) -> FloatArray:
-    """From the sum Σ a² S of candidates with a² ≥ 0 that is nearest, relatively: one candidate more for each part."""
-    family = families[0]
+    Each noise adds the candidate that leaves least.
+    """
     places = np.geomspace(max(data.omega[0], 1e-3 * data.omega[-1]), data.omega[-1], 40)
-    widths = (1.0,) if len(family.names) == 2 else (0.02, 0.06, 0.2, 0.7, 2.0)
-    candidates = [np.array(family.start(place, width), dtype=float) for place in places for width in widths]
-    firsts = [int(block[0]) for block in np.array_split(np.arange(data.omega.size), min(data.omega.size, 400))]
+    candidates = np.array([kind.start(place, width) for place in places for width in (0.02, 0.06, 0.2, 0.7, 2.0)])
+    n = data.omega.size
+    firsts = np.linspace(0, n, min(n, 400), endpoint=False).astype(int)
 
     def sums(each: FloatArray) -> FloatArray:
-        return np.asarray(np.add.reduceat(weights * each, firsts), dtype=float)
+        return np.asarray(np.add.reduceat(data.weights * each, firsts), dtype=float)
 
-    def mean(each: FloatArray) -> FloatArray:
-        return sums(each) / sums(np.ones_like(each))
-
-    root = np.sqrt(sums(data.number))
-    measured = mean(data.values)
-    columns = np.array([mean(data.expected(family, each)) for each in candidates]).T
-    scaled = columns / measured[:, None] * root[:, None]
+    root, measured = np.sqrt(sums(data.number)), sums(data.values)
+    scaled = np.array([sums(data.sum(kind, each)) / measured * root for each in candidates]).T
     chosen: list[int] = []
-    for _ in families:
+    for _ in range(terms):
         left = [nnls(scaled[:, [*chosen, i]], root)[1] for i in range(len(candidates))]
         chosen.append(int(np.argmin(left)))
     sizes, _ = nnls(scaled[:, chosen], root)
-    found = []
-    for i, size in zip(chosen, np.maximum(sizes, 1e-3 * max(sizes)), strict=True):
-        theta = candidates[i].copy()
-        theta[family.amplitude] *= math.sqrt(size)
-        found.append(np.log(theta))
-    return np.concatenate(found)
+    sizes = np.maximum(sizes, 1e-3 * max(sizes))
+    return np.ravel(np.log(candidates[chosen]) + 0.5 * np.outer(np.log(sizes), kind.multiplies))
 
 
-def _fitted(
-    data: _Data, families: Sequence[Kind], weights: FloatArray, passed: Sequence[FloatArray]
-) -> tuple[FloatArray, float, bool]:
-    """ln θ where the deviance is least, the deviance, and whether the search was stopped before its end.
+def _fitted(data: _Data, kind: Kind, terms: int, passed: Sequence[FloatArray]) -> _Found:
+    """The noises of a kind for which the deviance is least.
 
     Args:
         passed: weights with which the means of Ŝ and of S(θ) must be the same.
     """
-    size = np.sqrt(2 * weights * data.number)
+    size = np.sqrt(2 * data.weights * data.number)
     large = PASSING * float(np.linalg.norm(size))
 
     def residuals(theta: FloatArray) -> FloatArray:
-        fitted = _sum(data, families, theta)
+        fitted = data.sum(kind, np.exp(theta))
         bounded = np.clip(np.log(data.values) - np.log(fitted), -100, 100)
         there = [large * math.log((each @ data.values) / (each @ fitted)) for each in passed]
-        return np.array([*np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)), *there])
+        return np.append(np.sign(bounded) * size * np.sqrt(np.maximum(np.expm1(bounded) - bounded, 0)), there)
 
-    starts = [_start(data, families, weights)]
-    if len(families) > 1:  # one part more beside the best sum of fewer, which halves a part of it in two places
-        fewer, _, _ = _fitted(data, families[1:], weights, passed)
-        first = fewer[: len(families[0].names)]
-        shift = np.zeros_like(first)
-        shift[0 if families[0].amplitude else 1] = 1.0
-        half = np.zeros_like(first)
-        half[families[0].amplitude] = 0.5 * math.log(2)
-        starts.append(np.concatenate([first - half - shift, first - half + shift, fewer[first.size :]]))
-    highest = np.concatenate([family.highest for family in families])
+    starts = [_start(data, kind, terms)]
+    if terms > 1:  # the best one, a half of it on either side
+        one, k = np.log(_fitted(data, kind, 1, passed).values), len(kind.names)
+        half, place = one - 0.5 * math.log(2) * kind.multiplies, np.eye(k)[np.argmin(kind.multiplies)]
+        starts.append(np.concatenate([half - place, half + place]))
+    highest = np.tile(kind.highest, terms)
     found = []
     for start in (np.minimum(each, highest) for each in starts):
         bounds = (start - 15, np.minimum(start + 15, highest))
-        each = least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=MOST_STEPS)
-        if not each.status:  # it was stopped
-            each = least_squares(residuals, each.x, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=MORE_STEPS)
-        found.append(each)
+        found.append(least_squares(residuals, start, bounds=bounds, ftol=1e-10, xtol=1e-8, max_nfev=MOST_STEPS))
     best = min(found, key=lambda each: each.cost)
-    return best.x, 2 * best.cost, not best.status
+    return _Found(kind, np.exp(best.x), 2 * best.cost, not best.status)
 
 
-def _slopes(data: _Data, families: Sequence[Kind], theta: FloatArray) -> FloatArray:
-    """∂ ln Sᵢ/∂ ln θ by central differences, shape (n, k)."""
-    h = 1e-5
-    columns = [
-        (np.log(_sum(data, families, theta + h * unit)) - np.log(_sum(data, families, theta - h * unit))) / (2 * h)
-        for unit in np.eye(len(theta))
-    ]
-    return np.array(columns).T
+def slopes_of(f: Callable[[FloatArray], FloatArray], x: FloatArray) -> FloatArray:
+    """∂f/∂ ln xₖ by central differences, shape (n, k).
+
+    Args:
+        f: of all x, to shape (n,).
+        x: positive, shape (k,).
+    """
+    steps = 1e-5 * np.eye(len(x))
+    return np.array([(f(x * (1 + step)) - f(x * (1 - step))) / 2e-5 for step in steps]).T
 
 
-def _told(
-    data: _Data,
-    families: Sequence[Kind],
-    theta: FloatArray,
-    weights: FloatArray,
-    misfit: tuple[Misfit, ...],
-    spectrum: Spectrum,
-) -> NoiseFit:
-    slopes = _slopes(data, families, theta)
-    slopes[:, theta > np.concatenate([family.highest for family in families]) - AT_END] = 0.0  # fixed there
-    information = slopes.T @ (slopes * (weights * data.number)[:, None])
+def _told(data: _Data, found: _Found, misfit: tuple[Misfit, ...]) -> NoiseFit:
+    kind, values, spectrum = found.kind, found.values, data.spectrum
+    parts = tuple(kind.noise.at(each) for each in kind.values(values))
+    slopes = slopes_of(lambda each: np.log(data.sum(kind, each)), values)
+    slopes[:, np.log(values) > np.tile(kind.highest, len(parts)) - AT_END] = 0.0  # fixed there
+    weighted = slopes * (data.weights * data.number)[:, None]
+    information = slopes.T @ weighted
     bread = np.linalg.pinv(information, rcond=UNTOLD, hermitian=True)
-    if data.record is not None and any(family.path for family in families):
-        meat = _simulated(data, data.record, families, theta, _sum(data, families, theta), weights[:, None] * slopes)
-    elif data.record is None:
-        meat = slopes.T @ (slopes * (weights**2 * data.number)[:, None])
+    if data.segments and kind.path:
+        meat = _simulated(data, data.segments, found, slopes)
     else:
-        # Hann's window correlates neighbours: of a Gaussian noise by 4/9, and by 1/36 at two steps
-        rows = slopes * (weights * data.number * math.sqrt(data.variance))[:, None]
-        meat = rows.T @ rows
-        for lag, share in ((1, 4 / 9), (2, 1 / 36)):
-            meat += share * (rows[lag:].T @ rows[:-lag] + rows[:-lag].T @ rows[lag:])
-    values = np.exp(theta)
+        rows = weighted * data.error[:, None]
+        meat = rows.T @ correlate1d(rows, data.correlation, axis=0, mode="constant")
     covariance = bread @ meat @ bread * np.outer(values, values) * (not spectrum.is_formula)
-    parts, keys, place = [], list[str](), 0
-    for name, family in zip(NAMES, families, strict=False):
-        own = values[place : place + len(family.names)]
-        parts.append(family.make(*own.tolist()))
-        keys += [f"{name}.{each}" if len(families) > 1 else each for each in family.names]
-        place += len(family.names)
-    messages = [Message(Code.SPECTRUM_GAP, low=low, high=high) for low, high in gaps(spectrum)]
+    messages = [Message(Code.FIT_STOPPED, steps=MOST_STEPS)] * found.is_stopped
     if spectrum.relative_error is None and not spectrum.is_formula:
         messages.append(Message(Code.NO_SPECTRUM_ERROR))
     size = np.sqrt(np.maximum(np.diag(information), 1e-300))
     if np.linalg.eigvalsh(information / np.outer(size, size))[0] < UNTOLD:
         messages.append(Message(Code.UNTOLD_PARAMETERS))
-    return NoiseFit(
-        parts=tuple(parts),
-        parameters=dict(zip(keys, values.tolist(), strict=True)),
-        covariance=covariance,
-        misfit=misfit,
-        spectrum=spectrum,
-        messages=tuple(messages),
-    )
+    return NoiseFit(parts, kind.names, covariance, misfit, spectrum, tuple(messages))
 
 
-def _simulated(
-    data: _Data, cut: _Cut, families: Sequence[Kind], theta: FloatArray, fitted: FloatArray, rows: FloatArray
-) -> FloatArray:
+def _simulated(data: _Data, segments: Segments, found: _Found, slopes: FloatArray) -> FloatArray:
     """The covariance of the sum of the scores of all segments, by segments of paths of the fitted noise.
 
     Args:
-        data, cut: of the record.
-        families: of the parts, none of which is Gaussian.
-        theta: the logarithms of their parameters.
-        fitted: Sᵢ(θ).
-        rows: wᵢgᵢ, shape (n, k).
+        data, segments: of the record.
+        found: noises that are not Gaussian.
+        slopes: gᵢ, shape (n, k).
     """
+    kind, fitted, rows = found.kind, data.sum(found.kind, found.values), data.weights[:, None] * slopes
+    assert kind.path
     rng, measured = np.random.default_rng(0), int(data.number[0])
     block = min(measured, BLOCK)
-    n = cut.window.size + (block - 1) * cut.hop
-    blocks = math.ceil(min(SEGMENTS, max(LEAST_SEGMENTS, SAMPLES / cut.hop)) / block)
-    sums = np.zeros((min(block, LAGS + 1), theta.size, theta.size))
+    n = segments.length + (block - 1) * segments.hop
+    blocks = math.ceil(np.clip(SAMPLES / segments.hop, LEAST_SEGMENTS, SEGMENTS) / block)
+    meat = np.zeros((rows.shape[1], rows.shape[1]))
     for _ in range(blocks):
-        values, k = np.zeros(n), 0
-        for family in families:
-            assert family.path is not None  # the parts are of one kind
-            values += family.path(np.exp(theta[k : k + len(family.names)]), cut.step, n, rng)
-            k += len(family.names)
-        scores = (cut.periodograms(values) / fitted - 1) @ rows
-        for lag, each in enumerate(sums):
-            each += scores[lag:].T @ scores[: block - lag] * (measured - lag) / (block - lag) / blocks
-    meat: FloatArray = sums[0] + sum(each + each.T for each in sums[1:])
+        values = np.sum([kind.path(n, segments.step, rng, **each) for each in kind.values(found.values)], axis=0)
+        scores = (segments.periodograms(values) / fitted - 1) @ rows
+        for lag in range(min(block, LAGS + 1)):
+            product = scores[lag:].T @ scores[: block - lag] * (measured - lag) / (block - lag) / blocks
+            meat += product + product.T if lag else product
     return meat
+
+
+def non_gaussian_from_record(record: Record) -> NoiseFit:
+    """`NonGaussianNoise` with r₀ < 1 from a record, with the standard errors of means over 40 blocks of it.
+
+    Raises:
+        ValueError: the kurtosis is not that of bounded tails, between 9/5 and 3, or the steps are too long.
+    """
+    x = record.values
+    n = x.size // BLOCKS * BLOCKS
+    columns = [x**2, x**4]
+    for lag in (1, 2, 4):
+        moved = np.pad(x[lag:] - x[:-lag], (0, lag)) ** 2 / (2 * lag * record.step)
+        columns.append(moved * x.size / (x.size - lag))
+    blocks = np.array(columns)[:, :n].reshape(len(columns), BLOCKS, -1).mean(axis=2).T
+    means = blocks.mean(axis=0)
+    names, slopes = ("D0", "tau0", "r0"), slopes_of(_parameters, means)
+    noise = NonGaussianNoise(**dict(zip(names, _parameters(means).tolist(), strict=True)))
+    decay = 2 * noise.tau0 / (5 - 3 * noise.r0)
+    if record.step > LONGEST_STEP * decay:
+        raise ValueError(
+            f"the steps of the record are {record.step:.4g}, too long for its quadratic variation; they must be below "
+            f"{LONGEST_STEP * decay:.4g}, {LONGEST_STEP:g} of V/(D0/tau0²); record at a higher rate, or fit "
+            "another kind"
+        )
+    times = record.duration / noise.correlation_time
+    messages = (Message(Code.SHORT_RECORD, times=times, least=LEAST_TIMES),) if times < LEAST_TIMES else ()
+    covariance = slopes @ np.cov((blocks / means).T) @ slopes.T / BLOCKS
+    return NoiseFit((noise,), names, covariance, (), record.spectrum(), messages)
+
+
+def _parameters(means: FloatArray) -> FloatArray:
+    """D₀, τ₀ and r₀ of the means of ξ², ξ⁴, q(Δ), q(2Δ), q(4Δ)."""
+    variance, fourth, q1, q2, q4 = means
+    kurtosis = fourth / variance**2
+    if not 9 / 5 < kurtosis < 3:
+        raise ValueError(
+            f"the kurtosis of the record is {kurtosis:.4g}; bounded noise of Eq. (7) has one between 1.8 and 3; fit "
+            "another kind, such as ornstein-uhlenbeck for 3"
+        )
+    a = (5 * kurtosis - 9) / (2 * (3 - kurtosis))
+    r0 = 1 - 1 / a
+    rate = (8 * q1 - 6 * q2 + q4) / 3
+    if not rate > 0:
+        raise ValueError("the steps of the record are too long for its quadratic variation; record at a higher rate")
+    strength = 0.5 * variance * (5 - 3 * r0)
+    tau0 = strength / rate
+    return np.array([strength * tau0, tau0, r0], dtype=float)

@@ -1,137 +1,108 @@
-"""What is fitted: the spectral density and the autocovariance of each kind by the logarithms of its parameters."""
+"""What is fitted: the spectral density and the autocovariance of each kind by its parameters."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model import Bounded, Filter, Noise, OrnsteinUhlenbeck
 
-Shape = Callable[[FloatArray, FloatArray], FloatArray]
+Values = Mapping[str, float | str]
+"""Those of all parameters of a noise by their names."""
 LARGEST_DAMPING = 10.0
 """Of a filter: its spectrum is that of noise of first order, up to 400 times its corner, and tells no larger one."""
-Path = Callable[[FloatArray, float, int, np.random.Generator], FloatArray]
 
 
-@dataclass(frozen=True)
-class Kind:
-    """A family of noises whose parameters are all positive.
+class Kind(NamedTuple):
+    """A family of noises whose parameters are all positive, and fitted by their logarithms.
 
     Attributes:
-        names: of the parameters, as the noise has them.
-        make: the noise of some values.
-        density: S(ω) by ω, shape (n,), and the values.
-        covariance: C(t) by t ≥ 0, shape (n,), and the values.
-        amplitude: which of the parameters multiplies ξ.
+        noise: one of them, which has the parameters that are not fitted.
+        names: of those that are fitted.
+        density: S(ω) by ω, shape (n,), and all parameters by their names.
+        covariance: C(t) by t ≥ 0, shape (n,), and the same.
         start: values from a place ω₀ and a relative width w of a peak, before the amplitude is known.
-        most: the largest value of each parameter.
-        path: of a noise that is not Gaussian, ξ at n equal steps by the step and the values; None of a Gaussian one.
+        path: of a noise that is not Gaussian, ξ at n equal steps by n, the step, random numbers and the parameters.
     """
 
+    noise: Noise
     names: tuple[str, ...]
-    make: Callable[..., Noise]
-    density: Shape
-    covariance: Shape
-    amplitude: int
-    start: Callable[[float, float], Sequence[float]]
-    most: tuple[float, ...] = ()
-    path: Path | None = None
+    density: Callable[..., FloatArray]
+    covariance: Callable[..., FloatArray]
+    start: Callable[[float, float], tuple[float, ...]]
+    path: Callable[..., FloatArray] | None = None
+
+    def values(self, fitted: FloatArray) -> list[Values]:
+        """All parameters of each noise of a sum by those of all that are fitted, one noise after the other."""
+        rows = fitted.reshape(-1, len(self.names)).tolist()
+        return [{**self.noise.values, **dict(zip(self.names, row, strict=True))} for row in rows]
+
+    @property
+    def multiplies(self) -> FloatArray:
+        """1 for the parameter that multiplies ξ, 0 for the others, shape (k,)."""
+        return np.array([float(name in self.noise.of_xi) for name in self.names])
 
     @property
     def highest(self) -> FloatArray:
         """The logarithms of the largest values, shape (k,)."""
-        return np.log(self.most or (math.inf,) * len(self.names))
+        return np.log([LARGEST_DAMPING if name == "zeta" else math.inf for name in self.names])
 
 
-def _ou_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
-    alpha, sigma = theta
-    return sigma**2 / (alpha**2 + omega**2)
+def _filter_covariance(t: FloatArray, omega: float, zeta: float, s: float, c0: float, c1: float) -> FloatArray:
+    """Of the poles −b₁, −b₂ of the filter: s² Σ (c₀² − c₁²bᵢ²)/(2bᵢ(bⱼ² − bᵢ²)) exp(−bᵢt)."""
+    root = np.sqrt(complex(zeta**2 - 1 - 1e-12))  # a double pole would be 0/0
+    first, second = omega * (zeta + root), omega * (zeta - root)
+    found = np.zeros(t.shape, dtype=complex)
+    for b, other in ((first, second), (second, first)):
+        found += (c0**2 - (c1 * b) ** 2) / (2 * b * (other**2 - b**2)) * np.exp(-b * t)
+    return s**2 * found.real
 
 
-def _ou_covariance(t: FloatArray, theta: FloatArray) -> FloatArray:
-    alpha, sigma = theta
-    return sigma**2 / (2 * alpha) * np.exp(-alpha * t)
-
-
-def _bounded_density(omega: FloatArray, theta: FloatArray) -> FloatArray:
-    mu, nu, sigma = theta
-    half = 0.5 * sigma**2
-    return 0.5 * mu**2 * half * (1 / (half**2 + (omega - nu) ** 2) + 1 / (half**2 + (omega + nu) ** 2))
-
-
-def _bounded_covariance(t: FloatArray, theta: FloatArray) -> FloatArray:
-    mu, nu, sigma = theta
-    return 0.5 * mu**2 * np.exp(-0.5 * sigma**2 * t) * np.cos(nu * t)
-
-
-def _bounded_path(theta: FloatArray, step: float, n: int, rng: np.random.Generator) -> FloatArray:
-    mu, nu, sigma = theta
-    turns = nu * step + sigma * math.sqrt(step) * rng.standard_normal(n)
-    return np.asarray(mu * np.cos(rng.uniform(0, 2 * math.pi) + np.cumsum(turns)))
-
-
-def _filter(has_value: bool, has_slope: bool) -> Kind:
-    """That of ξ = y, of ξ = y′, or of ξ = y + c₁y′."""
-
-    def output(theta: FloatArray) -> tuple[float, float]:
-        return float(has_value), (float(theta[3]) if has_value else 1.0) if has_slope else 0.0
-
-    def density(omega: FloatArray, theta: FloatArray) -> FloatArray:
-        own, zeta, s = theta[:3]
-        c0, c1 = output(theta)
-        square = (own**2 - omega**2) ** 2 + (2 * zeta * own * omega) ** 2
-        return np.asarray(s**2 * (c0**2 + (c1 * omega) ** 2) / square)
-
-    def covariance(t: FloatArray, theta: FloatArray) -> FloatArray:
-        own, zeta, s = theta[:3]
-        c0, c1 = output(theta)
-        turn = own * np.sqrt(complex(1 - zeta**2 + 1e-12))  # a double root would be 0/0
-        # (exp((−ζω + iω_d)t) ± exp((−ζω − iω_d)t))/2 decay each by itself, so that nothing overflows for ζ > 1
-        first, second = (np.exp((-zeta * own + side * 1j * turn) * t) for side in (1, -1))
-        even, odd = 0.5 * (first + second), zeta * own / turn * (first - second) / 2j
-        unit = s**2 / (4 * zeta * own**3)
-        return np.asarray((unit * (c0**2 * (even + odd) + (c1 * own) ** 2 * (even - odd))).real)
-
-    def make(*theta: float) -> Noise:
-        c0, c1 = output(np.array(theta))
-        return Filter(theta[0], theta[1], theta[2], c0, c1)
-
-    both = has_value and has_slope
+def _filter(c0: float, c1: float, *more: str) -> Kind:
+    """That of ξ = c₀y + c₁y′, of which more than its strength may be fitted."""
     return Kind(
-        ("omega", "zeta", "s", "c1")[: 4 if both else 3],
-        make,
-        density,
-        covariance,
-        2,
-        lambda omega, width: (omega, width, 1.0, 0.3 / omega)[: 4 if both else 3],
-        most=(math.inf, LARGEST_DAMPING, math.inf, math.inf)[: 4 if both else 3],
+        Filter(1.0, 1.0, 1.0, c0, c1),
+        ("omega", "zeta", "s", *more),
+        lambda w, omega, zeta, s, c0, c1: (
+            s**2 * (c0**2 + (c1 * w) ** 2) / ((omega**2 - w**2) ** 2 + (2 * zeta * omega * w) ** 2)
+        ),
+        _filter_covariance,
+        lambda place, width: (place, width, 1.0, *[0.3 / place for _ in more]),
     )
 
 
-OU = Kind(
-    ("alpha", "sigma"),
-    OrnsteinUhlenbeck,
-    _ou_density,
-    _ou_covariance,
-    1,
-    lambda omega, width: (omega, 1.0),
-)
-BOUNDED = Kind(
-    ("mu", "nu", "sigma"),
-    Bounded,
-    _bounded_density,
-    _bounded_covariance,
-    0,
-    lambda omega, width: (1.0, omega, (2 * width * omega) ** 0.5),
-    path=_bounded_path,
-)
 KINDS = {
-    "ornstein-uhlenbeck": (OU,),
-    "filter": (_filter(True, False), _filter(False, True), _filter(True, True)),
-    "bounded": (BOUNDED,),
+    "ornstein-uhlenbeck": (
+        Kind(
+            OrnsteinUhlenbeck(1.0, 1.0),
+            ("alpha", "sigma"),
+            lambda w, alpha, sigma: sigma**2 / (alpha**2 + w**2),
+            lambda t, alpha, sigma: sigma**2 / (2 * alpha) * np.exp(-alpha * t),
+            lambda place, width: (place, 1.0),
+        ),
+    ),
+    "filter": (_filter(1.0, 0.0), _filter(0.0, 1.0), _filter(1.0, 1.0, "c1")),
+    "bounded": (
+        Kind(
+            Bounded(1.0, 1.0, 1.0),
+            ("mu", "nu", "sigma"),
+            lambda w, mu, nu, sigma: (
+                (mu * sigma / 2) ** 2 * (1 / (sigma**4 / 4 + (w - nu) ** 2) + 1 / (sigma**4 / 4 + (w + nu) ** 2))
+            ),
+            lambda t, mu, nu, sigma: 0.5 * mu**2 * np.exp(-0.5 * sigma**2 * t) * np.cos(nu * t),
+            lambda place, width: (1.0, place, math.sqrt(2 * width * place)),
+            lambda n, step, rng, mu, nu, sigma: (
+                mu
+                * np.cos(
+                    np.cumsum(nu * step + sigma * math.sqrt(step) * rng.standard_normal(n))
+                    + rng.uniform(0, 2 * math.pi)
+                )
+            ),
+        ),
+    ),
 }
 """By the word of a case file the families among which a fit chooses, those with fewer parameters first."""

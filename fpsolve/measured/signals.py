@@ -1,13 +1,17 @@
-"""What is measured, the units it may have in a file, and its conversion to a relative stiffness or to a damping."""
+"""What is measured, and the units that it may have in a file."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 from fpsolve.measured.weak import Where
+
+if TYPE_CHECKING:
+    import pint
 
 
 @dataclass(frozen=True)
@@ -16,136 +20,114 @@ class Signal:
 
     Attributes:
         words: what it is.
-        units: by how they may be written, what a value is multiplied by.
         noise_in: where its noise is.
-        unit: in which it is then.
+        unit: in which its numbers are used.
     """
 
     words: str
-    units: Mapping[str, float]
     noise_in: Where
     unit: str
 
 
 SIGNALS: Mapping[str, Signal] = {
-    "stiffness": Signal("relative stiffness", {"1": 1.0, "-": 1.0, "%": 0.01}, "stiffness", "1"),
-    "damping": Signal("damping", {"1/s": 1.0, "1/ms": 1e3, "1/min": 1 / 60, "rad/s": 1.0}, "damping", "1/s"),
-    "acceleration": Signal(
-        "vertical acceleration of the support",
-        {"m/s^2": 1.0, "cm/s^2": 0.01, "mm/s^2": 1e-3, "gal": 0.01, "g": 9.80665},
-        "stiffness",
-        "m/s²",
-    ),
-    "height": Signal("metacentric height", {"m": 1.0, "cm": 0.01, "mm": 1e-3, "ft": 0.3048}, "stiffness", "m"),
+    "stiffness": Signal("relative stiffness", "stiffness", "1"),
+    "damping": Signal("damping", "damping", "1/s"),
+    "acceleration": Signal("vertical acceleration of the support", "stiffness", "m/s^2"),
+    "height": Signal("metacentric height", "stiffness", "m"),
 }
 """By the word of `fpsolve noise --of`."""
-TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0}
-FREQUENCIES = {"hz": "Hz", "cycle/s": "Hz", "rad/s": "rad/s"}
-INVERSE_TIMES = ("1/s",)
-"""Of frequencies, which may be in Hz or in rad/s."""
-_RAISED = {**{ord(a): f"^{b}" for a, b in zip("⁰¹²³⁴⁵⁶⁷⁸⁹", range(10), strict=True)}, ord("⁻"): "^-", ord("−"): "-"}
-_RAISED |= {ord("·"): "*", ord("µ"): "u", ord("μ"): "u", ord("{"): "", ord("}"): ""}
-_SAME = {"sec": "s", "second": "s", "seconds": "s", "hertz": "hz", "cycles": "cycle", "radian": "rad", "radians": "rad"}
-_SAME |= {"minute": "min", "minutes": "min", "hour": "h", "hours": "h", "metre": "m", "meter": "m", "meters": "m"}
-_SAME |= {"day": "d", "days": "d", "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns", "msec": "ms"}
-_TOKENS = re.compile(r"\s*([a-z%]+|\^?\s*[+-]?\d+|[()/*.]|-)")
-Powers = Mapping[str, int]
-"""A unit as powers of symbols: m/s² is {"m": 1, "s": −2}, and what has no unit is {}."""
+UNITS = """milli- = 1e-3 = m-
+micro- = 1e-6 = µ- = μ- = u-
+nano- = 1e-9 = n-
+centi- = 0.01 = c-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+meter = [length] = m = metre
+inch = 0.0254 * meter = in
+foot = 0.3048 * meter = ft
+second = [time] = s = sec = Second
+millis = 1e-3 * second
+micros = 1e-6 * second
+minute = 60 * second = min
+hour = 60 * minute = h
+day = 24 * hour = d
+cycle = [cycle] = cycles
+radian = [angle] = rad
+hertz = cycle / second = Hz
+standard_gravity = 9.80665 * meter / second ** 2 = g = G
+gal = 0.01 * meter / second ** 2 = Gal
+volt = [voltage] = V = Volt
+percent = 0.01 = %"""
+"""As pint reads them. A cycle and a radian are no numbers here, so that a density per Hz is none per rad/s."""
+DENSITIES = {"Hz": "hertz", "rad/s": "radian/second", "": "1/second"}
+"""What a density may be per: per 1/s tells nothing."""
+LONGEST = 40
+"""Letters of a unit."""
+_POWERS = str.maketrans({each: f"^{digit}" for digit, each in enumerate("⁰¹²³⁴⁵⁶⁷⁸⁹")} | {"⁻": "^-", "−": "-"})
+_NO_UNIT = re.compile(r"\d\s*(\*\*|\^)|\d\d|\(\s*\d|[^\w\s/*^().·%+-]")
+"""Such as a power of a number, which takes for ever."""
 
 
 class Density(NamedTuple):
-    """The unit of a density: that of the signal, and "Hz" or "rad/s"; each is None or empty where it is not told."""
+    """What a density in a unit is raised to and multiplied by, and what it is per: "Hz", "rad/s" or ""."""
 
-    signal: Powers | None
+    power: int
+    factor: float
     per: str
 
 
-def powers(unit: str) -> Powers | None:
-    """What a unit says, written as (m/s²)², m2 s-4, m^2/s^4 or m²·s⁻⁴; None where it cannot be read.
+@cache
+def _registry() -> pint.UnitRegistry[float]:
+    import pint  # 0.3 s
 
-    A power is a whole number behind a symbol or a bracket, and / is of the next one alone, as in UDUNITS. Prefixes are
-    no matter here: cm is a symbol of its own.
-    """
-    text = unit.translate(_RAISED).replace("^^", "^").replace("^-^", "^-").replace("**", "^").strip().lower()
-    tokens, place = list[str](), 0
-    while place < len(text):
-        found = _TOKENS.match(text, place)
-        if found is None:
-            return None
-        tokens.append(re.sub(r"[\^\s+]", "", found[1]))
-        place = found.end()
-    try:
-        product, rest = _product(tokens)
-    except (IndexError, ValueError):
-        return None
-    return None if rest else {symbol: power for symbol, power in product.items() if power}
-
-
-def _product(tokens: list[str]) -> tuple[dict[str, int], list[str]]:
-    """A product up to its closing bracket, and what follows that."""
-    found, sign = dict[str, int](), 1
-    while tokens and tokens[0] != ")":
-        first, *tokens = tokens
-        if first in "/*.-":
-            sign = -1 if first == "/" else sign
-            continue
-        if first == "(":
-            factor, tokens = _product(tokens)
-            tokens = tokens[1:] if tokens[0] == ")" else tokens
-        else:
-            factor = {} if first.lstrip("-").isdigit() else {_SAME.get(first, first): 1}
-        if tokens and tokens[0].lstrip("-").isdigit():
-            sign *= int(tokens.pop(0))
-        for symbol, power in factor.items():
-            found[symbol] = found.get(symbol, 0) + sign * power
-        sign = 1
-    return found, tokens
-
-
-def among(unit: str, known: Iterable[str]) -> str:
-    """Which of some units this is; empty where it is none of them."""
-    stated = powers(unit)
-    return next((each for each in known if unit.strip() and stated is not None and powers(each) == stated), "")
-
-
-def density_unit(unit: str) -> Density:
-    """What a unit such as "(m/s²)²/Hz", "m2 s-4 Hz-1", "g^2/Hz", "m2 s" or "1/Hz" says. Raises `ValueError`.
-
-    A density per s⁻¹ may be one per Hz or per rad/s, which is not told then.
-    """
-    if not unit.strip():
-        return Density(None, "")
-    whole, per = powers(unit), ""
-    text = f'has the unit "{unit}", which is none of a density; write one such as (m/s^2)^2/Hz'
-    if whole is None:
-        raise ValueError(text)
-    left = dict(whole)
-    if left.get("hz") == -1:
-        per = "Hz"
-        del left["hz"]
-    elif left.get("rad") == -1:
-        per = "rad/s"
-        del left["rad"]
-        left["s"] = left.get("s", 0) - 1
-    elif left.get("s", 0) % 2 == 1:
-        left["s"] -= 1
-    else:
-        raise ValueError(text)
-    if any(power % 2 for power in left.values()):
-        raise ValueError(f'has the unit "{unit}", whose first part is no square; write one such as (m/s^2)^2/Hz')
-    return Density({symbol: power // 2 for symbol, power in left.items() if power}, per)
-
-
-def factor_of(of: str, unit: Powers | None, text: str) -> float:
-    """The unit of a file in that of a signal; 1 where the file tells none. Raises `ValueError`."""
-    signal = SIGNALS[of]
-    if unit is None and not text.strip():
-        return 1.0
-    found = next((factor for each, factor in signal.units.items() if powers(each) == unit), None)
-    if found is None:
-        such = [name for name, each in SIGNALS.items() if unit in map(powers, each.units)]
-        own = f"--of {' or '.join(such or SIGNALS)}"
-        raise ValueError(
-            f'has the unit "{text}", but {of} is in one of {", ".join(signal.units)}; state --unit, or {own}'
-        )
+    found: pint.UnitRegistry[float] = pint.UnitRegistry(None)
+    found.load_definitions(UNITS.splitlines())
     return found
+
+
+@cache
+def quantity(unit: str) -> pint.Quantity[float]:
+    """One of a unit, written as m/s², m s-2, (m/s^2)^2/Hz or g/sqrt(Hz); 1 and - are none. Raises `ValueError`."""
+    text = re.sub(r"√(\w+)|sqrt\((\w+)\)", r"(\1\2)^0.5", unit.strip().strip("[]"))
+    text = re.sub(r"\^+(-?)\^", r"^\1", re.sub(r"[{}]", "", text).translate(_POWERS))
+    text = re.sub(r"(?<=[A-Za-z)])(-?\d)", r"^\1", text)
+    try:
+        if len(text) > LONGEST or _NO_UNIT.search(text):
+            raise ValueError
+        return _registry().Quantity(1.0, _registry().parse_units("" if text in ("-", "1") else text))
+    except Exception:  # pint raises many kinds for what is no unit
+        level = "; its values are levels L: convert them, G = 10^(L/10)" if "dB" in unit else ""
+        raise ValueError(f'has the unit "{unit}", which is not known{level}') from None
+
+
+def has_dimension(unit: str, *wanted: str) -> bool:
+    """Whether a unit is one of the kinds of some others."""
+    try:
+        return bool(unit) and any(quantity(unit).is_compatible_with(quantity(each)) for each in wanted)
+    except ValueError:
+        return False
+
+
+def factor_of(unit: str, wanted: str) -> float:
+    """What a number in a unit is multiplied by to be in the wanted one. Raises `ValueError`."""
+    if not quantity(unit).is_compatible_with(quantity(wanted)):
+        own = [f"--of {name}" for name, each in SIGNALS.items() if has_dimension(unit, each.unit)]
+        remedy = " or ".join(own) or f"--unit {wanted} and --scale, how many {wanted} one {unit} stands for"
+        raise ValueError(f'has the unit "{unit}", and not {wanted} or one like it; state {remedy}')
+    return float(quantity(unit).to(quantity(wanted).units).magnitude)
+
+
+def density_of_unit(unit: str, signal: str) -> Density:
+    """What a unit such as (m/s²)²/Hz, m2 s-4 Hz-1, g²/Hz, m² s or g/√Hz says of a density. Raises `ValueError`."""
+    for per, each in DENSITIES.items():
+        wanted = quantity(signal) ** 2 / quantity(each)
+        for power in (1, 2):
+            found = quantity(unit) ** power
+            if found.is_compatible_with(wanted):
+                return Density(power, float(found.to(wanted.units).magnitude), per)
+    raise ValueError(f'has the unit "{unit}", which is none of a density, such as {density_such_as(signal)}')
+
+
+def density_such_as(signal: str) -> str:
+    """The usual unit of a density."""
+    return "1/Hz" if signal == "1" else f"({signal})^2/Hz" if "/" in signal else f"{signal}^2/Hz"

@@ -3,37 +3,62 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve.analysis.sensitivity import Sensitivities, solve_sensitivities
 from fpsolve.analysis.spreads import Spread
-from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
-from fpsolve.exponent.error import Estimate
+from fpsolve.arrays import FloatArray
+from fpsolve.errors import NoSuchExponent, NotConverged
 from fpsolve.exponent.method import Budget
 from fpsolve.exponent.solver import solver_of
 from fpsolve.measured.fit import NoiseFit
-from fpsolve.messages import Code, Message
+from fpsolve.messages import Message
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 
-STEPS = 4
+STEPS = 2
 """Of `verdict`, each of which calls `progress`."""
+SURE = 2.0
+"""Standard errors from 0 beyond which a sign is decided."""
+
+
+@dataclass(frozen=True)
+class GrowthRate(Spread):
+    """λ or Λ(2), whose standard error `deviation` is the root of the sum of the squares of three.
+
+    Attributes:
+        scatter: that by the errors of the measured values, 1/√k of it with k times as long a record.
+        misfit: that by what a fit is off beyond these errors, as no noise of its kind is the measured one.
+        numerical: that of the solution.
+    """
+
+    scatter: float
+    misfit: float
+    numerical: float
+
+    @property
+    def is_decided(self) -> bool:
+        return abs(self.value) > SURE * self.deviation
+
+    @property
+    def times(self) -> float:
+        """How many times as long a record decides the sign of this value; ∞ where none does."""
+        left = (self.value / SURE) ** 2 - self.misfit**2 - self.numerical**2
+        return self.scatter**2 / left if left > 0 else math.inf
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """λ and Λ(2), in 1/time, each a `Spread` with a standard error; `below` of it is the probability that it is < 0.
+    """λ and Λ(2), in 1/time, each with a standard error; `below` of it is the probability that it is < 0.
 
     The law is normal. Its variance is that of the fit, and what the fit is off where it matters beyond standard errors.
     In a narrow band Λ(2) is known at once, by moment equations, and λ may not converge: it is None then, and `failure`
     says why.
     """
 
-    exponent: Spread | None
-    moment: Spread | None
+    exponent: GrowthRate | None
+    moment: GrowthRate | None
     failure: Message | None = None
 
 
@@ -55,7 +80,7 @@ def verdict(
         problem: a system with `fit.noise`, in the unit in which the system takes it, see `NoiseFit.scaled`.
         fit: of the noise.
         rtol, budget: as for `moment_lyapunov`.
-        progress: called for λ and Λ(2), and again for the derivatives of each: `STEPS` times.
+        progress: called after λ and after Λ(2): `STEPS` times.
 
     Raises:
         ValueError: the problem has another noise.
@@ -64,53 +89,35 @@ def verdict(
     solver = solver_of(problem, rtol=rtol, budget=budget)
     if problem.noise != fit.noise:
         raise ValueError("the noise of the problem is not that of the fit; make it of fit.noise, or of fit.scaled(...)")
-    section = problem.system.noise_sections[0] if len(fit.parts) == 1 else "noise"
-    keys = [f"{section}.{key}" for key in fit.parameters]
-    along = {key: by for key, by in problem.derivatives().items() if key in keys}
-    name = LYAPUNOV_EXPONENT.name
+    keys = [f"{section}.{name}" for section in [*problem.sections][1:] for name in fit.names]
 
-    def moment() -> Spread:
+    def moment() -> GrowthRate:
         if even := solver.method.even(2.0):
-            progress()
-            return _spread(even.value, even.error, {key: even.slope(key)[0] for key in keys}, fit, keys)
+            return _rate(even.value, even.error, np.array([even.slope(key)[0] for key in keys]), fit)
         found = solver.solution(2.0)
-        progress()
-        slopes = _slopes(solve_sensitivities(solver, np.array([2.0]), along, indices=[], progress=progress))
-        return _spread(found.value, found.error, _values(slopes.moments[0]), fit, keys)
+        return _rate(found.value, found.error, 2 * solver.method.gradient(2.0, keys), fit)
 
-    def exponent() -> Spread:
+    def exponent() -> GrowthRate:
         found = solver.lyapunov_exponent()
-        progress()
-        slopes = _slopes(solve_sensitivities(solver, np.zeros(0), along, indices=[name], progress=progress))
-        return _spread(found.value, found.error_estimate, _values(slopes.indices[name]), fit, keys)
+        return _rate(found.value, found.error_estimate, solver.method.gradient(0.0, keys), fit)
 
-    solved, failures = list[Spread | None](), list[FpsolveError]()
+    solved, failure = list[GrowthRate | None](), None
     for solve in (moment, exponent):
         try:
             solved.append(solve())
-        except (NotConverged, NoSuchExponent) as failure:
+        except (NotConverged, NoSuchExponent) as error:
             solved.append(None)
-            failures.append(failure)
-    if len(failures) == len(solved):
-        raise failures[-1]
-    return Verdict(solved[1], solved[0], failures[0].message if failures else None)
+            failure = error
+        progress()
+    if failure and not any(solved):
+        raise failure
+    return Verdict(solved[1], solved[0], failure.message if failure else None)
 
 
-def _values(slopes: Mapping[str, Estimate]) -> dict[str, float]:
-    return {key: each.value for key, each in slopes.items()}
-
-
-def _slopes(found: Sensitivities) -> Sensitivities:
-    """Derivatives. Raises `NotConverged` where there are none."""
-    for note in found.notes:
-        if note.code is Code.NO_SENSITIVITIES:
-            raise NotConverged(note.data["reason"])
-    return found
-
-
-def _spread(value: float, error: float, slopes: Mapping[str, float], fit: NoiseFit, keys: Sequence[str]) -> Spread:
-    g = np.array([slopes[key] for key in keys])
-    by_size = 0.5 * float(g @ (fit.powers * np.array([*fit.parameters.values()])))
-    return Spread(
-        value, value, math.hypot(math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), error, fit.off * by_size)
-    )
+def _rate(value: float, error: float, g: FloatArray, fit: NoiseFit) -> GrowthRate:
+    """A value with its numerical error and its derivatives g by the parameters of a fit."""
+    by_size = 0.5 * float(g @ (fit.powers * fit.values))
+    scatter, misfit = math.sqrt(max(float(g @ fit.covariance @ g), 0.0)), abs(fit.off * by_size)
+    if not any(abs(each.relative) > SURE * each.error for each in fit.misfit):  # it may be scatter, too
+        scatter, misfit = math.hypot(scatter, misfit), 0.0
+    return GrowthRate(value, value, math.hypot(scatter, misfit, error), scatter, misfit, error)

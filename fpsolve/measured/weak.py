@@ -13,17 +13,19 @@ These are Eqs. (36)-(39) without walls.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Literal
 
-from fpsolve.arrays import shown
+from fpsolve.arrays import real_number, shown
 
 Where = Literal["stiffness", "damping"]
 PLACES = ("stiffness", "damping")
+GRAVITY = 9.80665
+"""In m/s²."""
 
 
 def weak_moment(p: float, omega: float, zeta: float, at_double: float, at_zero: float, noise_in: Where) -> float:
-    """Λ(p) in weak noise, see above, in 1/time.
+    """Λ(p) in weak noise, see above, in 1/time: of λ it is pλ + p²(λ + ζω)/2, with p² S(0)/8 of noise in the damping.
 
     Args:
         p: the moment.
@@ -35,22 +37,22 @@ def weak_moment(p: float, omega: float, zeta: float, at_double: float, at_zero: 
     Raises:
         ValueError: `noise_in` is neither.
     """
-    factor = omega**2 if checked_place(noise_in) == "stiffness" else 1.0
-    mean_square = 0.0 if noise_in == "stiffness" else p * p * at_zero / 8
-    return -zeta * omega * p + p * (p + 2) * factor * at_double / 16 + mean_square
+    rate = weak_exponent(omega, zeta, at_double, noise_in)
+    from_zero = at_zero / 8 if noise_in == "damping" else 0.0
+    return p * rate + p * p * ((rate + zeta * omega) / 2 + from_zero)
 
 
 def weak_exponent(omega: float, zeta: float, at_double: float, noise_in: Where) -> float:
     """λ in weak noise, see above and `weak_moment`, in 1/time."""
-    factor = omega**2 if checked_place(noise_in) == "stiffness" else 1.0
+    factor = omega**2 if checked_choice("noise_in", noise_in, PLACES) == "stiffness" else 1.0
     return -zeta * omega + factor * at_double / 8
 
 
-def checked_place(noise_in: str) -> str:
-    """The place of the noise. Raises `ValueError`."""
-    if noise_in not in PLACES:
-        raise ValueError(f"got noise_in = {shown(noise_in)}; must be one of {', '.join(PLACES)}")
-    return noise_in
+def checked_choice(name: str, value: str, known: Collection[str]) -> str:
+    """A value that is among those that are known. Raises `ValueError`."""
+    if value not in known:
+        raise ValueError(f"got {name} = {shown(value)}; must be one of {', '.join(known)}")
+    return value
 
 
 def frequencies_that_matter(omega: float, second: float | None, noise_in: Where) -> Mapping[str, float]:
@@ -61,11 +63,61 @@ def frequencies_that_matter(omega: float, second: float | None, noise_in: Where)
     Raises:
         ValueError: a frequency is not > 0, or `noise_in` is none.
     """
-    for name, value in (("frequency", omega), ("second_frequency", second)):
-        if value is not None and not 0 < value < float("inf"):
-            raise ValueError(f"got {name} = {shown(value)}; must be > 0 and finite, in rad/time")
-    zero = {"0": 0.0} if checked_place(noise_in) == "damping" else {}
+    double = 2 * checked_positive("frequency", omega)
     if second is None:
-        return {"2ω": 2 * omega, **zero}
-    difference = {"|ω₁ − ω₂|": abs(omega - second)} if omega != second else {}
-    return {"2ω₁": 2 * omega, "2ω₂": 2 * second, "ω₁ + ω₂": omega + second, **difference, **zero}
+        matter = {"2ω": double}
+    else:
+        matter = {"2ω₁": double, "2ω₂": 2 * checked_positive("second_frequency", second), "ω₁ + ω₂": omega + second}
+        if omega != second:
+            matter["|ω₁ − ω₂|"] = abs(omega - second)
+    if checked_choice("noise_in", noise_in, PLACES) == "damping":
+        matter["0"] = 0.0
+    return matter
+
+
+def checked_positive(name: str, value: float) -> float:
+    """A number > 0. Raises `ValueError`."""
+    if not real_number(value, name) > 0:
+        raise ValueError(f"got {name} = {shown(value)}; must be a number > 0 and finite")
+    return float(value)
+
+
+def of_relative_stiffness(omega: float) -> float:
+    """ω², by which a relative stiffness, dimensionless, becomes the ξ of `ParametricOscillator`, in 1/time².
+
+    Args:
+        omega: natural frequency, in rad/time.
+
+    Raises:
+        ValueError: it is not > 0 and finite.
+    """
+    return checked_positive("omega", omega) ** 2
+
+
+def of_support_acceleration(gravity: float = GRAVITY) -> float:
+    """1/g, by which the vertical acceleration of the support of a pendulum becomes a relative stiffness.
+
+    A pendulum of length ℓ whose support has the acceleration a upward obeys ϑ̈ + 2ζω ϑ̇ + ((g + a)/ℓ) ϑ = 0, so that
+    ω² = g/ℓ and ξ = a/g; the ξ of `ParametricOscillator` is a/ℓ = ω²a/g.
+
+    Args:
+        gravity: g, in the unit of the acceleration; that of m/s² if omitted.
+
+    Raises:
+        ValueError: it is not > 0 and finite.
+    """
+    return 1 / checked_positive("gravity", gravity)
+
+
+def of_stability_height(metacentric_height: float) -> float:
+    """1/GM, by which a variation ΔGM of the metacentric height of a ship becomes a relative stiffness of its roll.
+
+    Roll obeys ϑ̈ + 2ζω ϑ̇ + ω²(GM + ΔGM)/GM ϑ = 0, so that ξ = ΔGM/GM.
+
+    Args:
+        metacentric_height: GM, in the unit of ΔGM.
+
+    Raises:
+        ValueError: it is not > 0 and finite.
+    """
+    return 1 / checked_positive("metacentric_height", metacentric_height)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.case.kinds import made_of
 from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import Budget
@@ -29,13 +29,14 @@ from fpsolve.measured import (
     weak_exponent,
     weak_moment,
 )
-from fpsolve.measured.fit import NAMES
+from fpsolve.measured.fit import NAMES, slopes_of
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.stability import STEPS
-from fpsolve.measured.weak import Where
+from fpsolve.measured.weak import Where, frequencies_that_matter
 from fpsolve.messages import Code, Message
-from fpsolve.model import Problem
+from fpsolve.model import ImpactLaw, ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.model.plane import STEADY, System
+from fpsolve.model.systems.equations import EquationSystem
 
 NON_GAUSSIAN = "non-gaussian"
 STEPS_OF_A_FIT = 1 + STEPS
@@ -46,6 +47,7 @@ SECONDS = 20.0
 """Of a processor for λ and for Λ(2) each."""
 FILES = ("noise.json", "noise.png", "noise.pdf", "noise.toml")
 """What is written of a measurement."""
+IMPACT = "oscillator.impact"
 STILL = 1e-6
 """Of a modulus: imaginary parts below are none."""
 
@@ -63,6 +65,10 @@ class Modes:
     omega: tuple[float, ...]
     zeta: float
     restitution: float | None = None
+
+    @property
+    def second(self) -> float | None:
+        return self.omega[1] if len(self.omega) > 1 else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,9 +99,28 @@ class Wanted:
     def noise_in(self) -> Where:
         return SIGNALS[self.of].noise_in
 
+    @property
+    def noise_unit(self) -> str:
+        """Of ξ in the system."""
+        own = "1/time²" if self.noise_in == "stiffness" else "1/time"
+        return self.case.system.noise_unit if self.case else own
 
-Critical = tuple[float, float]
-"""A damping ratio above which a moment decays in weak noise without walls, and its standard error."""
+
+Number = tuple[float, float]
+"""A number and its standard error."""
+
+
+class Density(NamedTuple):
+    """S(ω) of the relative stiffness, or of the damping, at a frequency ω that matters, in rad/s.
+
+    Attributes:
+        measured: as the values near ω, or the formula, have it; None where the kind is fitted to moments.
+    """
+
+    name: str
+    omega: float
+    measured: Number | None
+    fitted: Number
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,20 +128,30 @@ class NoiseOutcome:
     """What became of a measurement.
 
     Attributes:
+        data: what was measured, in the unit of its signal.
         fit: of the relative stiffness, or of the damping in 1/s.
         scaled: the same in the unit in which the system takes it.
-        exponent, moment: the critical damping ratios for λ and for Λ(2), of one mode.
-        verdict: of the system; None where there is no system, or nothing of it was solved.
+        system: under this noise; None where none is stated.
+        densities: at the frequencies that matter.
+        exponent, moment: of one mode the damping ratios above which λ < 0 and Λ(2) < 0 in weak noise without walls.
+        verdict: of the system; None where nothing of it was solved.
         failure: why it, or a part of it, was not solved.
     """
 
     wanted: Wanted
+    data: Spectrum | Record
     fit: NoiseFit
     scaled: NoiseFit
-    exponent: Critical | None = None
-    moment: Critical | None = None
+    system: System | None
+    densities: Sequence[Density]
+    exponent: Number | None = None
+    moment: Number | None = None
     verdict: Verdict | None = None
     failure: Message | None = None
+
+    @property
+    def messages(self) -> Sequence[Message]:
+        return (*self.fit.messages, *filter(None, [self.failure]))
 
 
 def natural_frequencies(system: System) -> tuple[float, ...]:
@@ -136,7 +171,15 @@ def refuse_wrong_case(case: Case, wanted_of: str, terms: int) -> None:
     if any(key.startswith("noise.") for key in case.vary.keys):
         raise FpsolveError(f"{case.path}: varies its noise, which the fit replaces; leave these keys out of [vary]")
     if terms > 1:
-        raise FpsolveError(f"got --terms {terms} for {case.path}, which has one noise; state --damping-ratio instead")
+        try:
+            under_sum(case.system)
+        except ValueError as error:
+            raise FpsolveError(f"got --terms {terms} for {case.path}: {error}") from None
+        if isinstance(case.system, VibroImpactOscillator) and (case.vary.file or IMPACT in case.vary.keys):
+            raise FpsolveError(
+                f"got --terms {terms} for {case.path}, whose [oscillator] becomes an equation, and which varies its "
+                "impact law or has its sets in a file; leave out [vary], or write the system as an equation"
+            )
     place = {"1/time": "damping", "1/time²": "stiffness"}.get(unit, noise_in)
     if place != noise_in:
         raise FpsolveError(
@@ -162,8 +205,11 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
         fit = _fit(data, wanted)
         fit = replace(fit, messages=(*(Message(Code.AS_READ, text=each) for each in data.notes), *fit.messages))
         progress()
-        outcome = NoiseOutcome(wanted, fit, fit.scaled(_factor(wanted)), *_critical(fit, wanted))
-        if (system := _system(wanted, len(fit.parts))) is None:
+        densities = [*_densities(fit, wanted)]
+        scaled, critical = fit.scaled(_factor(wanted)), _critical(densities, wanted)
+        system = _system(wanted)
+        outcome = NoiseOutcome(wanted, data, fit, scaled, system, densities, *critical)
+        if system is None:
             return outcome
         problem = Problem(system, outcome.scaled.noise)
         rtol, budget = max(choose(problem).usual_rtol, wanted.rtol), Budget(seconds=wanted.seconds)
@@ -180,9 +226,8 @@ def _fit(data: Spectrum | Record, wanted: Wanted) -> NoiseFit:
     factor = of_support_acceleration() if wanted.of == "acceleration" else 1.0
     converted = data.scaled(factor if wanted.height is None else of_stability_height(wanted.height))
     if wanted.kind != NON_GAUSSIAN:
-        first, *others = wanted.modes.omega
         return fit_noise(
-            converted, wanted.kind, frequency=first, second_frequency=next(iter(others), None),
+            converted, wanted.kind, frequency=wanted.modes.omega[0], second_frequency=wanted.modes.second,
             noise_in=wanted.noise_in, terms=wanted.terms, segment=wanted.segment,
         )  # fmt: skip
     if not isinstance(converted, Record):
@@ -194,62 +239,69 @@ def _fit(data: Spectrum | Record, wanted: Wanted) -> NoiseFit:
 
 def _factor(wanted: Wanted) -> float:
     """What the relative stiffness, or the damping, is multiplied by to be ξ of the system."""
-    system = wanted.case.system if wanted.case else None
-    if system is None:
-        return of_relative_stiffness(wanted.modes.omega[0]) if wanted.noise_in == "stiffness" else 1.0
-    if system.noise_unit == "1/time²":
-        return of_relative_stiffness(natural_frequencies(system)[0])
-    return 1 / system.linear().epsilon if system.noise_unit == "1/time" else 1.0
+    if wanted.noise_unit == "1/time²":
+        return of_relative_stiffness(wanted.modes.omega[0])
+    return 1 / wanted.case.system.linear().epsilon if wanted.case and wanted.noise_unit == "1/time" else 1.0
 
 
-def _system(wanted: Wanted, terms: int) -> System | None:
-    """The system of the case, or the oscillator that is stated; None without either."""
+def _system(wanted: Wanted) -> System | None:
+    """The system of the case, or the oscillator that is stated, under all terms of the noise; None without either."""
+    omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta, wanted.modes.restitution or 1.0
     if wanted.case:
-        return wanted.case.system
-    _, table = oscillator_of(wanted, terms)
-    system: Any = made_of("system", table) if table else None
-    return system
+        system = wanted.case.system
+    elif math.isnan(zeta) or wanted.modes.second:
+        return None
+    elif wanted.noise_in == "stiffness":
+        system = ParametricOscillator(stiffness=omega**2, damping=zeta * omega, restitution=r)
+    else:
+        c1, impact = -2 * zeta * omega, ImpactLaw.RESTITUTION
+        system = VibroImpactOscillator(omega=omega, restitution=r, c1=c1, epsilon=1.0, impact=impact)
+    return under_sum(system) if wanted.terms > 1 else system
 
 
-def oscillator_of(wanted: Wanted, terms: int) -> tuple[str, dict[str, Any]]:
-    """The section and the table of an oscillator with the damping and the wall that are stated; nothing without these.
-
-    Under the sum of two noises it is an equation.
-    """
-    omega, zeta, r = wanted.modes.omega[0], wanted.modes.zeta, wanted.modes.restitution
-    if math.isnan(zeta) or len(wanted.modes.omega) > 1:
-        return "", {}
-    if terms > 1:
-        total = " + ".join(NAMES)
-        force = f"+ ({total}) * v" if wanted.noise_in == "damping" else f"- ({total}) * x"
-        return "system", {
-            "variables": ["x", "v"],
-            "drift": ["v", f"-omega**2 * x - 2*zeta*omega * v {force}"],
-            "parameters": {"omega": omega, "zeta": zeta},
-            "noises": {name: f"noise.{name}" for name in NAMES},
-            "walls": [] if r is None else [{"at": "x = 0", "restitution": r}],
-        }
-    wall = {"restitution": r or 1.0}
-    if wanted.noise_in == "stiffness":
-        return "system", {"kind": "parametric", "stiffness": omega**2, "damping": zeta * omega, **wall}
-    return "oscillator", {"omega": omega, "c1": -2 * zeta * omega, "impact": "restitution", "epsilon": 1.0, **wall}
+def under_sum(system: System) -> EquationSystem:
+    """An equation with the sum of two noises in place of a system's noise. Raises `ValueError` where there is none."""
+    total, noises = " + ".join(NAMES), {name: f"noise.{name}" for name in NAMES}
+    if type(system) is EquationSystem:
+        [(symbol, _)] = system.noises
+        rates = [re.sub(rf"\b{symbol}\b", f"({total})", rate) for rate in system.drift]
+        return replace(system, drift=rates, noises=tuple(noises.items()))
+    if isinstance(system, ParametricOscillator):
+        rate, restitution = f"-(stiffness + {total})*x - 2*damping*v", "restitution"
+    elif isinstance(system, VibroImpactOscillator):
+        rate = f"-omega**2*x + epsilon*({total})*v + epsilon**2*(c1 - c2*x**2 - c3*v**2)*v"
+        loss = "epsilon**2*(1 - restitution)"
+        restitution = f"exp(-{loss})" if system.impact == ImpactLaw.DELTA else f"1 - {loss}"
+    else:
+        raise ValueError("this kind of system has one noise; write the system as an equation, with variables and drift")
+    numbers = {name: value for name, value in system.values.items() if isinstance(value, float)}
+    wall = {"at": "x = 0", "restitution": restitution}
+    return PlaneSystem.of_equations(("x", "v"), ("v", rate), numbers, noises=noises, walls=[wall])
 
 
-def _critical(fit: NoiseFit, wanted: Wanted) -> tuple[Critical | None, Critical | None]:
+def _densities(fit: NoiseFit, wanted: Wanted) -> Iterator[Density]:
+    matter = frequencies_that_matter(wanted.modes.omega[0], wanted.modes.second, wanted.noise_in)
+    values, errors = density_of(fit, [*matter.values()])
+    for i, (name, omega) in enumerate(matter.items()):
+        measured, fitted = None, (float(values[i]), float(errors[i]))
+        if fit.misfit:
+            found = fitted[0] * (1 + fit.misfit[i].relative)
+            measured = found, found * fit.misfit[i].error
+        yield Density(name, omega, measured, fitted)
+
+
+def _critical(densities: Sequence[Density], wanted: Wanted) -> tuple[Number | None, Number | None]:
     """The damping ratios at which λ and Λ(2) vanish in weak noise, by the densities that were measured or named."""
-    if len(wanted.modes.omega) > 1 or (wanted.case and wanted.case.system.noise_unit == "unknown"):
+    if wanted.modes.second or wanted.noise_unit == "unknown":
         return None, None  # of equations that have a coefficient of their own for the noise
-    omega = wanted.modes.omega[0]
-    values, errors = density_of(fit, [2 * omega, 0.0])
-    for i, each in enumerate(fit.misfit):
-        values[i] *= 1 + each.relative
-        errors[i] = each.error * values[i]
+    omega, noise_in = wanted.modes.omega[0], wanted.noise_in
+    (double, its_error), (zero, zero_error) = [*(each.measured or each.fitted for each in densities), (0.0, 0.0)][:2]
 
     def moment(at_double: float, at_zero: float) -> float:
-        return weak_moment(2, omega, 0.0, at_double, at_zero, wanted.noise_in) / (2 * omega)
+        return weak_moment(2, omega, 0.0, at_double, at_zero, noise_in) / (2 * omega)
 
-    value, error = (weak_exponent(omega, 0.0, each, wanted.noise_in) / omega for each in (values[0], errors[0]))
-    return (value, error), (moment(*values), math.hypot(moment(errors[0], 0.0), moment(0.0, errors[1])))
+    value, error = (weak_exponent(omega, 0.0, each, noise_in) / omega for each in (double, its_error))
+    return (value, error), (moment(double, zero), math.hypot(moment(its_error, 0.0), moment(0.0, zero_error)))
 
 
 def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, FloatArray]:
@@ -258,9 +310,5 @@ def density_of(fit: NoiseFit, omega: Sequence[float]) -> tuple[FloatArray, Float
     def densities(each: NoiseFit) -> FloatArray:
         return np.array([each.spectral_density(w) for w in omega])
 
-    slopes = list[FloatArray]()
-    for key, value in fit.parameters.items():
-        h = 1e-5 * value
-        up, down = (densities(fit.at({key: value + step})) for step in (h, -h))
-        slopes.append((up - down) / (2 * h))
-    return densities(fit), np.sqrt(np.maximum(np.einsum("ki,kl,li->i", slopes, fit.covariance, slopes), 0.0))
+    slopes = slopes_of(lambda values: densities(fit.at(values)), fit.values) / fit.values
+    return densities(fit), np.sqrt(np.maximum(np.einsum("ik,kl,il->i", slopes, fit.covariance, slopes), 0.0))

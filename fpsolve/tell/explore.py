@@ -281,13 +281,13 @@ class Explorer:
 
     def _text(self, case: Case) -> str:
         changed = self._changed(case) | {key: case.problem.values[key] for key in self.source.vary.keys}
-        lists, p, names = dict[str, list[object]](), self.case.p.tolist(), self.source.output.names
+        others, p, names = dict[str, object](), self.case.p.tolist(), self.source.output.names
         if p != self.source.p.tolist():
-            lists["moments.p"] = p
+            others["moments.p"] = p
         if names is not None and not {*self.quantities} <= {*names}:
-            lists["output.quantities"] = [*dict.fromkeys((*names, *self.quantities))]
+            others["output.quantities"] = [*dict.fromkeys((*names, *self.quantities))]
         without = "expect", "vary", "figure"
-        return rewritten(self.source, self.source.path.parent, changed, without=without, lists=lists)
+        return rewritten(self.source, self.source.path.parent, changed, without=without, others=others)
 
     def _report(self, question: Question) -> Answer:
         """The report of these numbers."""

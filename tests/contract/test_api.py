@@ -117,7 +117,7 @@ def test_a_spectrum_with_fill_values_is_read_without_a_warning(tmp_path, recwarn
     f = np.linspace(0.1, 5, 50)
     values = xr.Dataset({"S": ("f", 1 / (1 + f * f))}, {"f": ("f", f, {"units": "Hz"})})
     values.to_netcdf(tmp_path / "s.nc", engine="scipy", encoding={"S": {"_FillValue": -1.0}})
-    assert read_spectrum(tmp_path / "s.nc", sided="one").density.size == 50
+    assert read_spectrum(tmp_path / "s.nc", sided="one", unit="1/Hz").density.size == 50
     assert not [str(each.message) for each in recwarn]
 
 

@@ -2,7 +2,6 @@
 
 import pickle
 import re
-import sys
 from dataclasses import replace
 
 import matplotlib
@@ -260,12 +259,6 @@ def test_sensitivities_are_by_parameter_with_units_of_a_ratio(results):
     missing = replace(slopes, moments=({}, slopes.moments[1])).to_xarray()
     assert np.isnan(missing.moment_by_theta[0]).all()
     same(missing, "moment_by_theta", np.stack([missing.moment_by_theta[0], found.moment_by_theta[1]]))
-
-
-def test_a_table_without_pandas_names_what_to_install(results, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(fpsolve.FpsolveError, match=r"pip install 'fpsolve\[pandas\]'"):
-        results["moments"].to_pandas()
 
 
 def test_results_are_values(results):

@@ -1,6 +1,6 @@
-"""Internals of measurements: kinds that are fitted, arrays of MATLAB, and limits of what is read."""
+"""Internals of measurements: kinds that are fitted, arrays of MATLAB, libraries that are missing, memory."""
 
-import sys
+import os
 
 import numpy as np
 import pytest
@@ -8,8 +8,9 @@ from scipy.integrate import trapezoid
 from scipy.io import savemat
 
 from fpsolve import FpsolveError
-from fpsolve.measured import read_record, tables
-from fpsolve.measured import text as text_tables
+from fpsolve.measured import read_record
+from fpsolve.measured.files import KINDS as KINDS_OF_FILES
+from fpsolve.measured.files import read_table
 from fpsolve.measured.kinds import KINDS
 
 FAMILIES = [each for families in KINDS.values() for each in families]
@@ -18,39 +19,43 @@ FAMILIES = [each for families in KINDS.values() for each in families]
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda each: ",".join(each.names))
 def test_kinds_have_the_covariance_and_the_density_of_their_noises(family):
     """C(0) is the variance, and 2∫ C cos ωt dt over t > 0 the density."""
-    t, theta = np.linspace(0, 200, 200_001), np.array([1.3, 0.4, 0.7, 0.8][: len(family.names)])
-    noise, c = family.make(*theta.tolist()), family.covariance(t, theta)
+    t, [values] = np.linspace(0, 200, 200_001), family.values(np.array([1.3, 0.4, 0.7, 0.8][: len(family.names)]))
+    noise, c = family.noise.at(values), family.covariance(t, **values)
     assert c[0] == pytest.approx(noise.standard_deviation**2)
     for omega in (0.3, 2.0):
-        assert family.density(np.array([omega]), theta)[0] == pytest.approx(noise.spectral_density(omega))
+        assert family.density(np.array([omega]), **values)[0] == pytest.approx(noise.spectral_density(omega))
         assert 2 * trapezoid(c * np.cos(omega * t), t) == pytest.approx(noise.spectral_density(omega), rel=1e-4)
 
 
-@pytest.mark.parametrize("compressed", [False, True])
-def test_arrays_of_matlab_of_all_types_are_read_and_the_rest_is_left_out(compressed, tmp_path):
+def test_arrays_of_matlab_of_all_types_are_read_and_the_rest_is_left_out(tmp_path):
     kinds, wide = ("u1", "i2", "i4", "u8", "f4", "f8"), np.arange(12.0).reshape(6, 2)
-    others = {"text": "a", "cell": np.array([1, "a"], dtype=object), "z": np.array([1j]), "deep": {"x": 1.0}}
+    others = {"text": "a", "cell": np.array([1, "a"], dtype=object), "z": np.array([1j]), "cube": np.ones((2, 2, 2))}
     arrays = {f"x_{kind}": np.array([[1, 2, 100]], dtype=kind) for kind in kinds}
-    savemat(tmp_path / "a.mat", {**arrays, "wide": wide, **others}, do_compression=compressed)
-    found = {name: each.values.tolist() for name, each in tables.read_table(tmp_path / "a.mat").columns.items()}
-    expected = {**{key: [1, 2, 100] for key in arrays}, "wide 1": wide[:, 0].tolist(), "wide 2": wide[:, 1].tolist()}
+    savemat(tmp_path / "a.mat", {**arrays, "wide": wide, "deep": {"x": wide[:, 0]}, **others})
+    found = {name: each.tolist() for name, each in read_table(tmp_path / "a.mat").columns.items()}
+    first, second = wide.T.tolist()
+    expected = {
+        **{key: [1, 2, 100] for key in arrays},
+        "wide 1": first,
+        "wide 2": second,
+        "deep.x": first,
+        "cell": [1, "a"],
+    }
     assert found == expected
 
 
-def test_universal_file_without_pyuff_says_how_it_is_installed(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyuff", None)
-    (tmp_path / "a.uff").write_text("    -1\n    58\n", encoding="utf-8")
-    with pytest.raises(FpsolveError, match=r"needs pyuff: pip install 'fpsolve\[measured\]'"):
-        read_record(tmp_path / "a.uff")
+@pytest.mark.parametrize("ending", ["uff", "mseed", "tdms", "lvm", "parquet", "xlsx"])
+def test_file_without_its_library_says_how_it_is_installed(ending, tmp_path, monkeypatch):
+    """The process that reads it finds a library that is none before that of the environment."""
+    library, _ = KINDS_OF_FILES[f".{ending}"]
+    (tmp_path / f"{library}.py").write_text("raise ImportError", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    (tmp_path / f"a.{ending}").write_bytes(b"PK\0")
+    with pytest.raises(FpsolveError, match=rf"needs {library}: pip install 'fpsolve\[measured\]'"):
+        read_record(tmp_path / f"a.{ending}")
 
 
-def test_what_is_too_large_is_refused_before_it_is_read(tmp_path, monkeypatch):
-    arrays = {f"a{k}": np.zeros(2**12) for k in range(4)}
-    np.savez_compressed(tmp_path / "a.npz", **arrays)
-    (tmp_path / "b.csv").write_text("t,x\n" + "1,2\n" * 5000, encoding="utf-8")
-    savemat(tmp_path / "c.mat", arrays, do_compression=True)
-    monkeypatch.setattr(tables, "MOST_NUMBERS", 2**13)
-    monkeypatch.setattr(text_tables, "MOST_LINES", 4000)
-    for name, most in (("a.npz", 2**13), ("b.csv", 4000), ("c.mat", 2**13)):
-        with pytest.raises(FpsolveError, match=f"{most}"):
-            read_record(tmp_path / name, rate=1.0)
+def test_file_that_would_take_all_memory_is_refused(tmp_path):
+    np.savez_compressed(tmp_path / "a.npz", a=np.zeros(2**27))
+    with pytest.raises(FpsolveError, match="is no file that numpy reads"):
+        read_record(tmp_path / "a.npz", rate=1.0, unit="1")

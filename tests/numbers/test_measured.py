@@ -154,26 +154,12 @@ def test_density_of_one_side_or_two_per_hertz_or_radian_is_converted(options, fa
 def test_spectrum_of_a_record_is_that_of_welch():
     """Hann's window, half of the segments overlapping."""
     record = Record(np.random.default_rng(1).normal(size=4096).cumsum() % 7, 0.02)
-    length = record.segment_length()
+    length = 128
     found = record.spectrum(length)
     f, density = welch(record.values, 50.0, nperseg=length, noverlap=length // 2, detrend="constant")
     at = 8 * math.pi
     right = np.interp(at, 2 * math.pi * f, density)
     assert np.interp(at, found.frequencies, 2 * found.density) == pytest.approx(right, rel=1e-9)
-
-
-def test_sides_that_are_not_those_of_the_record_are_told_by_its_variance():
-    omega, variance = np.linspace(0.001, 400, 100_000), OU.standard_deviation**2
-    density = OU.sigma**2 / (OU.alpha**2 + omega**2)
-    assert Spectrum(omega, density, variance=variance).covered_variance == pytest.approx(variance, rel=1e-2)
-    assert Spectrum(omega, 0.02 * density, variance=variance).covered_variance < variance  # as of a narrow band
-    for factor, said in (
-        (2, r"some 2 times as much; state another sided"),
-        (2 * math.pi, r"state another per"),
-        (9.80665**2, r"9\d\.\d times that of the record.*correct the unit"),
-    ):
-        with pytest.raises(ValueError, match=said):
-            Spectrum(omega, factor * density, variance=variance)
 
 
 BAND = (OMEGA < 3) | (OMEGA > 5)
@@ -209,11 +195,6 @@ REFUSED = [
 def test_measurement_that_tells_no_noise_is_refused(make, said):
     with pytest.raises((ValueError, TypeError), match=said):
         make()
-
-
-def test_gap_of_a_spectrum_beside_what_matters_is_noted():
-    said = [str(each) for each in fitted(AROUND, frequency=1.0).messages]
-    assert any("from" in each and "nothing was measured" in each for each in said)
 
 
 def test_factors_of_signals_are_those_of_a_pendulum_and_of_a_ship():
