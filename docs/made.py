@@ -172,11 +172,11 @@ stationary_density(ExponentSolver(case.problem).pair(0.0)).plot()
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fpsolve.measured import fit_noise, of_support_acceleration, read_spectrum
+from fpsolve.measured import fit_noise, read_spectrum
 
 # sphinx_gallery_thumbnail_number = -1
 sea = read_spectrum("../../../cases/measured/buoy.csv", of="acceleration", sided="one", column="acceleration")
-sea = sea.scaled(of_support_acceleration())
+sea = sea.scaled(1 / 9.80665)  # a relative stiffness, a/g
 natural = np.sqrt(case.problem.values["system.stiffness"])
 fit = fit_noise(sea, "filter", frequency=natural)
 figure, axes = plt.subplots(layout="constrained")

@@ -253,7 +253,7 @@ DEFECTS: tuple[Defect, ...] = (
         "fitted[0]",
         "noise",
     ),
-    Defect("L9 g is 9.81 m/s²", "measured/signals.py", "standard_gravity = 9.80665", "standard_gravity = 9.81", "noise"),
+    Defect("L9 g is 9.81 m/s²", "measured/signals.py", "gravity = 9.80665", "gravity = 9.81", "noise"),
     Defect(
         "L10 a verdict within its error is given",
         "measured/stability.py",
@@ -300,8 +300,8 @@ DEFECTS: tuple[Defect, ...] = (
     Defect(
         "R6 the unit of a named density is taken where --scale is stated",
         "commands/noise.py",
-        "if stated.scale == 1.0 else checked_scale",
-        "if stated.scale != 1.0 else checked_scale",
+        "if stated.scale == 1.0 else stated.scale",
+        "if stated.scale != 1.0 else stated.scale",
         "noise",
     ),
     Defect(

@@ -18,7 +18,6 @@ from fpsolve.fem.factors import one_thread
 from fpsolve.files import writable, write_json, write_text
 from fpsolve.measured import Record, Spectrum, read_record, read_spectrum
 from fpsolve.measured.named import NAMED, named_spectrum, parameters_of
-from fpsolve.measured.reading import checked_scale
 from fpsolve.measured.signals import SIGNALS, factor_of
 from fpsolve.measured.spectrum import UNITS
 from fpsolve.measured.weak import GRAVITY
@@ -69,7 +68,6 @@ class Statement:
         skip: Rows of the file that are left out at its beginning; of a text lines.
         names: Names of the columns of a text with their units, such as "t (s),a (g)", in place of its own.
         by: How the values of a record follow each other in a text.
-        log_log: The file has break points, with straight lines in the logarithms between.
         parameters: Those of the named density, such as Hs=2,Tp=9.
         segment: Seconds of a segment of a record; as the natural frequency needs if omitted.
         rtol: Tolerance of the exponents of the system, relative; 1e-4 if omitted.
@@ -105,7 +103,6 @@ class Statement:
     skip: Count = 0
     names: str = ""
     by: Literal["columns", "rows"] = "columns"
-    log_log: bool = False
     named: Annotated[
         str | None,
         Parameter(
@@ -121,14 +118,15 @@ class Statement:
 
 
 NOTHING_STATED = Statement()
-OF_SPECTRA, OF_RECORDS = ("sided", "averages", "log_log"), ("segment", "rate", "time_unit", "by")
-OF_FILES = ("over", "skip", "names")
+OF_SPECTRA, OF_RECORDS = ("sided", "averages"), ("segment", "rate", "time_unit", "by")
+OF_FILES = ("over", "skip", "names", "column", "unit")
 """Options for files alone: of one kind, of any."""
 RANGES = {
     "gm": (0.0, math.inf, "> 0, in m"),
     "length": (0.0, math.inf, "> 0, in m"),
     "rtol": (0.0, 1.0, "> 0 and < 1"),
     "seconds": (0.0, math.inf, "> 0, in seconds"),
+    "scale": (-math.inf, math.inf, "finite"),
     "frequency": (1e-12, 1e12, "> 1e-12 and < 1e12; state it in Hz"),
     "damping_ratio": (-1.0, 1.0, "> -1 and < 1; 0.01 is 1 % of critical damping"),
     "restitution": (0.0, 1.0 + 1e-15, "> 0 and <= 1; 1 means no wall"),
@@ -156,7 +154,11 @@ def measurement_of(
     for options, is_wrong, told in (
         (["named"], has_file, "is in place of a file, and one was named"),
         (["parameters"], not stated.named, "are those of --named"),
-        ([*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column"], not has_file, "is for a file, and a density was named"),
+        (
+            [*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column", "unit"],
+            not has_file,
+            "is for a file, and a density was named",
+        ),
         (OF_SPECTRA, not spectrum, "is for a spectrum, and a record was named"),
         (OF_RECORDS, spectrum, "is for a record, and a spectrum was named"),
         (["gm"], of != "height", "belongs to --of height"),
@@ -182,7 +184,7 @@ def measurement_of(
     if stated.named:
         return _named(stated.named, stated, of, 2 * modes.omega[0]), wanted, source
 
-    how = {option: given[option] for option in ("column", "unit", "scale", *OF_FILES)}
+    how = {option: given[option] for option in ("scale", *OF_FILES)}
     if stated.record:
         how_fast = {option: given[option] for option in ("rate", "time_unit", "by")}
         return read_record(source, of=of, **how_fast, **how), wanted, source
@@ -194,8 +196,7 @@ def _named(name: str, stated: Statement, of: str, near: float) -> Spectrum:
     """The density that is named, in the unit of its signal."""
     try:
         found = named_spectrum(name, near, **parameters_of(stated.parameters))
-        unit = stated.unit or NAMED[name].unit
-        factor = factor_of(unit, SIGNALS[of].unit) if stated.scale == 1.0 else checked_scale(stated.scale)
+        factor = factor_of(NAMED[name].unit, SIGNALS[of].unit) if stated.scale == 1.0 else stated.scale
     except ValueError as error:
         raise FpsolveError(f"--named: {error}") from None
     return found.scaled(factor)

@@ -9,8 +9,5 @@ from .spectrum import Record as Record
 from .spectrum import Spectrum as Spectrum
 from .stability import Verdict as Verdict
 from .stability import verdict as verdict
-from .weak import of_relative_stiffness as of_relative_stiffness
-from .weak import of_stability_height as of_stability_height
-from .weak import of_support_acceleration as of_support_acceleration
 from .weak import weak_exponent as weak_exponent
 from .weak import weak_moment as weak_moment

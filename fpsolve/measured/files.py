@@ -5,6 +5,7 @@ Some files that are broken end the process that reads them, or let it take all m
 
 from __future__ import annotations
 
+import glob
 import pickle
 import subprocess
 import sys
@@ -52,6 +53,8 @@ def read_table(path: Path, *, skip: int = 0, names: str = "", by_rows: bool = Fa
         )
         if isinstance(found, str):
             return parse(found, skip=skip, names=names, by_rows=by_rows)
+        if names or by_rows:
+            raise Unreadable("is no text, of which --names and --by rows tell; leave them out")
         columns = {name: each[skip:] for name, each in found.columns.items() if each.size > skip}
         if not columns:
             raise Unreadable(
@@ -101,9 +104,7 @@ def _netcdf(path: str) -> Iterator[Part]:
         groups = {"/": xr.open_dataset(path, engine="scipy", decode_timedelta=False)}
     for group, data in groups.items():
         for name, each in data.variables.items():
-            about = each.attrs
-            unit = str(about.get("units", about.get("Yunits", "")))
-            yield Part(f"{group}/{name}".strip("/"), each.values, unit, float(about.get("Xspacing", 0.0)))
+            yield Part(f"{group}/{name}".strip("/"), each.values, str(each.attrs.get("units", "")))
 
 
 def _sound(path: str) -> Iterator[Part]:
@@ -134,13 +135,13 @@ def _universal(path: str) -> Iterator[Part]:
 def _labview(path: str) -> Iterator[Part]:
     import lvm_read
 
-    found = lvm_read.read(path, read_from_pickle=False, dump_file=False)
+    found = lvm_read.read_str(Path(path).read_text(encoding="utf-8", errors="ignore"))
     if found["Segments"] != 1:
         raise Unreadable(f"has {found['Segments']} segments; export one")
     data = found[0]
     columns = zip(data["Channel names"], data["data"].T, strict=False)
     inner = [(name, values) for name, values in columns if name not in ("X_Value", "Comment")]
-    is_time = "Time" in data["X_Dimension"]
+    is_time = "Time" in data["X_Dimension"] and not set(data.get("X_Unit_Label", "s")) - {"", "s"}
     for (name, values), unit, step in zip(inner, data["Y_Unit_Label"], data["Delta_X"], strict=False):
         yield Part(name, values, unit, step * is_time)
 
@@ -150,8 +151,9 @@ def _tdms(path: str) -> Iterator[Part]:
 
     for group in nptdms.TdmsFile.read(path).groups():
         for each in group.channels():
-            unit, step = each.properties.get("unit_string", ""), each.properties.get("wf_increment", 0.0)
-            yield Part(f"{group.name}.{each.name}", each[:], unit, step)
+            about = each.properties
+            step = about.get("wf_increment", 0.0) if about.get("wf_xunit_string", "s") in ("", "s") else 0.0
+            yield Part(f"{group.name}.{each.name}", each[:], about.get("unit_string", ""), step)
 
 
 def _parquet(path: str) -> Iterator[Part]:
@@ -167,8 +169,10 @@ def _excel(path: str) -> str:
 
 def _seismic(path: str) -> Iterator[Part]:
     import obspy
+    from obspy.core.util.base import ENTRY_POINTS
 
-    for each in obspy.read(path):
+    ENTRY_POINTS["waveform"].pop("PICKLE", None)  # which may run what a file says
+    for each in obspy.read(glob.escape(path)):
         is_knet = each.stats._format == "KNET"  # whose factor makes them m/s²; that of others may lead to any unit
         unit = "m/s^2" if is_knet else each.stats.get("ascii", {}).get("unit", "")
         unit = unit.lower() if unit.isupper() else unit  # M/S**2 in the SEED standard

@@ -85,13 +85,11 @@ class Misfit(NamedTuple):
 
     Attributes:
         name: "2ω", or another.
-        omega: in rad/time.
         relative: measured/fitted − 1, both as lines through the nearest values have them at ω.
         error: its standard error; where those of the values are not known, by how far these are from their neighbours.
     """
 
     name: str
-    omega: float
     relative: float
     error: float
 
@@ -143,7 +141,7 @@ class NoiseFit:
         return sum(noise.spectral_density(omega) for noise in self.parts)
 
     def scaled(self, factor: float) -> NoiseFit:
-        """The fit of the signal times a factor, such as `of_relative_stiffness`; its misfits and messages stay."""
+        """The fit of the signal times a factor, such as ω²; its misfits and messages stay."""
         sizes = abs(factor) ** self.powers
         covariance = self.covariance * np.outer(sizes, sizes)
         return replace(self.at(self.values * sizes), covariance=covariance, spectrum=self.spectrum.scaled(factor))
@@ -254,7 +252,7 @@ def fit_noise(
         # more parameters must lower the deviance by ln n each, as in Bayes' criterion
         found = min(fits, key=lambda each: each.deviance + len(each.values) * math.log(len(used.values)))
         off = np.dot(places, used.values) / np.dot(places, used.sum(found.kind, found.values)) - 1
-        misfit = tuple(map(Misfit, matter, matter.values(), off.tolist(), errors))
+        misfit = tuple(map(Misfit, matter, off.tolist(), errors))
         return _told(used, found, misfit)
 
     found = best([])
@@ -330,13 +328,9 @@ def _refuse_far(omega: FloatArray, matter: Mapping[str, float]) -> None:
         low, high = omega[omega <= target * (1 + 1e-9)], omega[omega >= target * (1 - 1e-9)]
         near = min(high, default=math.inf) - max(low, default=-math.inf) <= 0.25 * target
         if not (near if target else omega[0] <= 0.1 * max(matter.values())):
-            nearest = omega[np.argmin(abs(omega - target))]
             where = f"{name} = {target:.4g} rad/time ({target / (2 * math.pi):.4g} cycles)" if target else "0"
-            raise ValueError(
-                f"nothing was measured near {where}, which stability depends on; the nearest point is {nearest:.4g} "
-                f"rad/time ({nearest / (2 * math.pi):.4g} cycles); measure there, or correct the natural frequency or "
-                "its unit"
-            )
+            told = f"nothing was measured near {where}, which stability depends on"
+            raise ValueError(f"{told}; measure there, or correct the natural frequency or its unit")
 
 
 def _of_spectrum(data: Spectrum) -> _Data:

@@ -11,7 +11,7 @@ from fpsolve.measured.signals import has_dimension
 
 SEPARATORS = ("\t", ";", ",", "")
 """Of cells; the last one is any number of spaces."""
-KNOWN = ("s", "Hz", "rad/s", "m", "m/s", "m/s^2", "V", "(m/s^2)^2/Hz", "m^2/Hz", "V^2/Hz", "1/s^2/Hz")
+KNOWN = ("s", "Hz", "rad/s", "m", "m/s", "m/s^2", "V", "(m/s^2)^2/Hz", "m^2/Hz", "V^2/Hz", "1/Hz")
 """Units by whose kinds a line of units is told from one of names."""
 LONGEST = 60
 """Letters of a name, and of what a file seems to say."""
@@ -22,6 +22,10 @@ _TIMES = re.compile(
     r"(?P<word>millis|micros|(?:milli|micro|nano)?seconds|sec)(?:_elapsed)?",
     re.IGNORECASE,
 )
+_ARITHMETIC = re.compile(r"log|[*×^]|\de[+-]?\d|^\d+\s*\D", re.IGNORECASE)
+"""In a heading: its unit may not be that of the numbers."""
+STAMP = re.compile(r"\d{4}[-/]\d\d?[-/]\d\d?.*|\d\d?[/.]\d\d?[/.]\d\d.*|([01]?\d|2[0-3]):\d\d:\d\d(\.\d+)?")
+"""A time of a calendar, or of a clock."""
 _WORDS = re.compile(r"[\s:;,=\[\]_]+|\((?=\w*\))|(?<=\w)\)")
 _BRACKETS = re.compile(r"^[\[(]([^\[\]()]*)[\])]$")
 _SPACED = re.compile(r"\S+(?:[ \t]+(?:\[.*?\]|\(.*?\)(?=\s|$)))?")
@@ -48,16 +52,12 @@ def cells_of(line: str, separator: str) -> list[str]:
         raise Unreadable(f"is no table ({error}); export it again") from None
 
 
-def separator_of(row: str) -> str:
-    """The first separator that is in a row."""
-    return next((each for each in SEPARATORS if each in row.strip(" \r")), "")
-
-
 def heading(text: str) -> tuple[str, str]:
     """The name and the unit of a column: "a (m/s²)", "a [m/s²]", "a / (m/s²)", "a / g"; of times "millis", "t_ms"."""
     text = text.strip()
     if found := _HEADING.fullmatch(text):
-        return (found["name"] or found["bare"] or "").strip(), (found["a"] or found["b"] or found["c"] or "").strip()
+        name, unit = found["name"] or found["bare"] or "", found["a"] or found["b"] or found["c"] or ""
+        return (text, "") if _ARITHMETIC.search(name) else (name.strip(), unit.strip())
     found = _TIMES.fullmatch(text)
     return text, (found["unit"] or found["word"]).lower() if found else ""
 
@@ -69,17 +69,19 @@ def header(above: Sequence[str], count: int, separator: str) -> tuple[list[str],
     Campbell have a line below with what was done.
     """
     lines = [without_mark(each)[1] for each in above]
-    if lines and lines[0].startswith('"TOA5"'):
-        lines = lines[:3]
-    rows = [row for row in (_row(each, count, separator) for each in reversed(lines)) if row]
-    if not rows:
+    is_of_campbell = bool(lines) and lines[0].startswith('"TOA5"')
+    rows = [
+        row
+        for row in (_row(each, count, separator) for each in reversed(lines[: 3 if is_of_campbell else None]))
+        if row
+    ]
+    if not rows or (count == 1 and len(lines) > 1):  # any line may be that of one column
         return [], [""] * count
     below = [_BRACKETS.sub(r"\1", each) for each in rows[0]]
-    if len(rows) > 1 and any(has_dimension(each, *KNOWN) for each in below):
-        del rows[0]
-    else:
-        below = [""] * count
-    return rows[0], below
+    known = [has_dimension(each, *KNOWN) for each in below if each]
+    if len(rows) > 1 and (is_of_campbell or 2 * sum(known) > len(known)):
+        return rows[1], below
+    return rows[0], [""] * count
 
 
 def _row(line: str, count: int, separator: str) -> list[str] | None:
@@ -97,6 +99,6 @@ def _row(line: str, count: int, separator: str) -> list[str] | None:
 def hint(lines: Sequence[str], dimensions: Sequence[str]) -> str:
     """The first line in which a unit of some kinds stands; empty if none has one."""
     for line in lines:
-        if any(has_dimension(word.strip("."), *dimensions) for word in _WORDS.split(line)):
+        if any(has_dimension(word, *dimensions) for word in _WORDS.split(line)):
             return " ".join(line.split())[:LONGEST]
     return ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError
 from fpsolve.measured.files import read_table
 from fpsolve.measured.signals import SIGNALS, density_of_unit, density_such_as, factor_of, has_dimension
@@ -23,15 +21,10 @@ from fpsolve.model.faults import nearest
 Per = Literal["Hz", "rad/s"]
 Sided = Literal["one", "two"]
 By = Literal["columns", "rows"]
-BETWEEN = 400
-"""Frequencies between the first and the last break point of a spectrum."""
-UNEVEN, JITTER = 1e-3, 0.05
-"""Shares of a step by which times may differ from even ones: without a note, and with one."""
-MOST_DIGITS = 12
-"""Of times, behind the decimal point."""
-ANGULAR = ("omega", "ω", "w")
-"""Names of frequencies in rad/s."""
-FREQUENCY_NAMES = ("f", "freq", "frequency", "frequencies", *ANGULAR)
+UNEVEN, JITTER = 1e-3, 0.2
+"""Shares of a step by which times may differ from even ones: without a note, and with one. A gap makes 0.5 at least."""
+HERTZ_NAMES = ("f", "freq", "frequency", "frequencies")
+FREQUENCY_NAMES = (*HERTZ_NAMES, "omega", "ω", "w")
 TIME_NAMES = ("t", "time", "times", "timestamp", "date", "zeit")
 
 
@@ -47,7 +40,6 @@ def read_spectrum(
     scale: float = 1.0,
     skip: int = 0,
     names: str = "",
-    log_log: bool = False,
     averages: float | None = None,
 ) -> Spectrum:
     """A spectral density from a file, see `read_table` for its formats and `Spectrum.from_columns` for conventions.
@@ -64,7 +56,6 @@ def read_spectrum(
         scale: what the signal is multiplied by, the density by its square.
         skip: rows of the file at its beginning that are left out, of a text its lines.
         names: of the columns of a text, with their units, such as "f (Hz),G (1/Hz)", in place of those that it has.
-        log_log: whether the file has break points, with straight lines in the logarithms between them.
         averages: see `Spectrum.from_columns`.
 
     Raises:
@@ -73,41 +64,37 @@ def read_spectrum(
     with _of_file(path, skip=skip, names=names) as table:
         if sided not in ("one", "two"):
             raise ValueError('states not whether the density is one-sided; state --sided, "one" or "two"')
-        f_name = over or next(iter(_columns_over(table, FREQUENCY_NAMES, "Hz", "rad/s", "1/s")), None)
-        if f_name is None:
-            raise ValueError(f"states no column of frequencies; state --over, or a record by --record; {_has(table)}")
-        name = _ordinate(table, [_named(table.columns, f_name)], column)
+        names_over = (
+            [_named(table.columns, over)] if over else _columns_over(table, FREQUENCY_NAMES, "Hz", "rad/s", "1/s")
+        )
+        if len(names_over) != 1:
+            told = f"has {len(names_over) or 'no'} columns of frequencies"
+            raise ValueError(f"{told}; state one by --over, or a record by --record; {_has(table)}")
+        name, f_name = _ordinate(table, names_over, column), names_over[0]
         f, values = table.numbers(f_name), table.numbers(name)
+        if f.size != values.size:
+            raise ValueError(f"has {f.size} frequencies in {f_name} and {values.size} values in {name}; export as many")
         signal, f_unit = SIGNALS[checked_choice("of", of, SIGNALS)].unit, table.units.get(f_name, "")
         unit = unit or _unit(table, name, density_such_as(signal))
         power, factor, density_per = density_of_unit(unit, signal)
-        f_per = next((each for each in ("Hz", "rad/s") if has_dimension(f_unit, each)), "")
-        told = {each for each in (per, f_per, density_per) if each}
-        if len(told) > 1 or (told == {density_per} and density_per == "Hz" and f_name.lower() in ANGULAR and not per):
+        f_per = next((each for each in ("Hz", "rad/s", "1/s") if has_dimension(f_unit, each)), "Hz")
+        f = f * factor_of(f_unit, f_per) if f_unit else f
+        stated = f_per if f_unit and f_per != "1/s" else per
+        pers = {each for each in (per, stated, density_per) if each}
+        if len(pers) > 1 or (pers and not stated and f_name.lower() not in HERTZ_NAMES):
             said = f"frequencies {f_name} ({f_unit or per or 'no unit'}) and densities {name} ({unit})"
             raise ValueError(f"has {said}; state --per and --unit that belong together, or convert one of both")
-        if not told:
+        if not pers:
             raise table.missing(f"unit of the frequencies {f_name}", "--per, Hz or rad/s", "Hz", "rad/s")
-        f = f * factor_of(f_unit, f_per) if f_per else f
-        values = values**power * factor * checked_scale(scale) ** 2
+        values = values**power * factor * scale**2
         order = np.argsort(f, kind="stable") if np.all(np.diff(f) < 0) else slice(None)
         f, values = f[order], values[order]
         left_out = (values == 0) & (f > 0) | np.r_[False, (np.diff(f) == 0) & (np.diff(values) == 0)]
         notes = (f"{np.sum(left_out)} rows are left out, whose density is 0 or which stand twice",) * any(left_out)
         f, values = f[~left_out], values[~left_out]
-        if log_log:
-            f, values = _between(f, values)
-        made = Spectrum.from_columns(f, values, "Hz" if told == {"Hz"} else "rad/s", sided, averages)
+        made = Spectrum.from_columns(f, values, "Hz" if pers == {"Hz"} else "rad/s", sided, averages)
         read = f"column {name} in {unit}, {sided}-sided, {f.size} frequencies"
-        return replace(made, notes=notes, is_formula=log_log, read=read)
-
-
-def _between(f: FloatArray, density: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Values on straight lines in the logarithms between break points."""
-    if f.size < 2 or not np.all(f > 0):
-        raise ValueError("has break points at frequencies that are not > 0, or one only; leave out log_log (--log-log)")
-    places = np.unique(np.concatenate([f, np.geomspace(f[0], f[-1], BETWEEN)[1:-1]]))
-    return places, np.exp(np.interp(np.log(places), np.log(f), np.log(density)))
+        return replace(made, notes=notes, read=read)
 
 
 def read_record(
@@ -141,7 +128,10 @@ def read_record(
     """
     with _of_file(path, skip=skip, names=names, by_rows=by == "rows") as table:
         wanted = SIGNALS[checked_choice("of", of, SIGNALS)].unit
-        rate = table.rate if rate is None else checked_positive("rate", rate)
+        if rate is not None:
+            checked_positive("rate", rate)
+        elif over is None and time_unit is None:
+            rate = table.rate
         times = [_named(table.columns, over)] if over else _columns_over(table, TIME_NAMES, "s")
         name = _ordinate(table, times, column)
         values = table.numbers(name)
@@ -149,27 +139,18 @@ def read_record(
             raise table.missing("times of its values", "--rate, in values per second, or --over", "s", "Hz")
         step, notes = _step(table, times[0], time_unit, values.size) if rate is None else (1 / rate, ())
         unit = unit or _unit(table, name, wanted, "V")
-        made = Record(values * factor_of(unit, wanted) * checked_scale(scale), step)
+        made = Record(values * factor_of(unit, wanted) * scale, step)
         return replace(made, notes=notes, read=f"column {name} in {unit}, {values.size} values, {1 / step:.6g} in 1 s")
 
 
 @contextmanager
-def _of_file(path: str | Path, *, skip: int, **how: Any) -> Iterator[Table]:
+def _of_file(path: str | Path, **how: Any) -> Iterator[Table]:
     """The table of a file; what is wrong with it is said of the file."""
-    if isinstance(skip, bool) or not isinstance(skip, int) or skip < 0:
-        raise FpsolveError(f"got skip = {skip}; must be a whole number >= 0 of rows (--skip)")
-    table = read_table(Path(path), skip=skip, **how)
+    table = read_table(Path(path), **how)
     try:
         yield table
     except ValueError as error:
         raise FpsolveError(f"{path}: {' '.join(str(error).split())}") from None
-
-
-def checked_scale(scale: float) -> float:
-    """A factor. Raises `ValueError`."""
-    if not (math.isfinite(scale) and scale != 0):
-        raise ValueError(f"cannot be multiplied by {scale}; state another --scale")
-    return scale
 
 
 def _has(table: Table) -> str:
@@ -210,10 +191,7 @@ def _ordinate(table: Table, over: Sequence[str], wanted: str | None) -> str:
 
 
 def _step(table: Table, name: str, unit: str | None, count: int) -> tuple[float, tuple[str, ...]]:
-    """The step of times in s, which must be even but for the digits that are written and some jitter, which is noted.
-
-    Times that are rounded lie within one unit of the last digit beside a line t₀ + iΔ, and no step is above 1.5 Δ.
-    """
+    """The step of times in s, which must be even but for some jitter, which is noted."""
     unit = unit or table.units.get(name, "")
     if not unit and not stamps_of(table.columns[name]):
         raise table.missing(f"unit of the times {name}", "--time-unit, such as s or ms", "s")
@@ -222,10 +200,9 @@ def _step(table: Table, name: str, unit: str | None, count: int) -> tuple[float,
         text = f"has times in {name} that do not increase, or not as many as values"
         raise ValueError(f"{text}; sort the rows, or state --over or --rate")
     exact = 4 * float(np.finfo(float).eps * np.max(abs(t)))
-    digits = next((k for k in range(MOST_DIGITS) if np.all(abs(t - np.round(t, k)) <= exact)), MOST_DIGITS)
     step, start = np.polyfit(np.arange(t.size), t - t[0], 1).tolist()
     beside = float(np.max(np.abs(t - t[0] - start - step * np.arange(t.size))))
-    if beside <= max(JITTER * step, 10.0**-digits) + exact and np.max(np.diff(t)) <= 1.5 * step:
+    if beside <= JITTER * step + exact:
         note = f"the times in {name} are up to {beside / step:.2g} of a step off even ones"
         taken = f"{note}, and the mean step {step:.9g} s is taken; --rate states another"
         return step, (taken,) * (beside > UNEVEN * step + exact)

@@ -43,6 +43,7 @@ centi- = 0.01 = c-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
 meter = [length] = m = metre
+kilogram = [mass] = kg
 inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
 second = [time] = s = sec = Second
@@ -111,8 +112,7 @@ def has_dimension(unit: str, *wanted: str) -> bool:
 def factor_of(unit: str, wanted: str) -> float:
     """What a number in a unit is multiplied by to be in the wanted one. Raises `ValueError`."""
     if not quantity(unit).is_compatible_with(quantity(wanted)):
-        own = [f"--of {name}" for name, each in SIGNALS.items() if has_dimension(unit, each.unit)]
-        remedy = " or ".join(own) or f"--unit {wanted} and --scale, how many {wanted} one {unit} stands for"
+        remedy = f"--unit {wanted} and --scale, how many {wanted} one {unit} stands for, or another --of"
         raise ValueError(f'has the unit "{unit}", and not {wanted} or one like it; state {remedy}')
     return float(quantity(unit).to(quantity(wanted).units).magnitude)
 

@@ -135,7 +135,7 @@ class Spectrum:
         return cls(omega[first:], density[first:], error)
 
     def scaled(self, factor: float) -> Spectrum:
-        """That of the signal times a factor, such as one of `fpsolve.measured.of_support_acceleration`."""
+        """That of the signal times a factor, such as 1/g."""
         return replace(self, density=self.density * factor**2)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fpsolve.arrays import FloatArray
 from fpsolve.files import Unreadable, Words
-from fpsolve.measured.header import heading, hint
+from fpsolve.measured.header import STAMP, heading, hint
 from fpsolve.measured.signals import factor_of
 
 WORDS = Words("the measurement", "a file of numbers", "spectrum.csv", "comma-separated", "export the data again", True)
@@ -56,8 +56,7 @@ class Table:
         if np.all(np.isfinite(values)):
             return values
         k = int(np.argmin(np.isfinite(values)))
-        told = f'"{cells[k]}"' if isinstance(cells[k], str) else "no number"
-        raise ValueError(f"has {told} in the column {name}, {self.place(k)}; write a number, or remove the row")
+        raise ValueError(f'has "{cells[k]}" in the column {name}, {self.place(k)}; write a number, or remove the row')
 
     def times(self, name: str, unit: str) -> FloatArray:
         """A column of times in s; those of a calendar or of a clock since the first. Raises `ValueError`."""
@@ -80,8 +79,7 @@ class Table:
 
 def stamps_of(cells: Cells) -> Stamps | None:
     """How cells are read that are times of a clock or of a calendar; None of others, by the first one."""
-    first = cells[0]
-    if cells.dtype.kind == "M" or (isinstance(first, str) and ":" in first):
+    if cells.dtype.kind in "mM" or (isinstance(cells[0], str) and STAMP.fullmatch(cells[0])):
         for read in STAMPS:
             with suppress(ValueError, TypeError, OverflowError):
                 read(cells[:1])
@@ -104,12 +102,17 @@ def columns_of(name: str, values: object) -> dict[str, Cells]:
         inner = [columns_of(f"{name}.{key}".strip("."), each) for key, each in values.items()]
         return {key: each for found in inner for key, each in found.items()}
     array = np.squeeze(np.asarray(values))
-    if array.dtype.kind not in "iufMO" or array.ndim not in (1, 2) or not array.size:
+    kind, shape = array.dtype.kind, array.shape
+    if kind not in "iufmMOcV" or not shape or not array.size:
         return {}
-    if array.ndim == 1:
+    if kind in "cV" or len(shape) > 2 or (len(shape) == 2 and min(shape) > MOST_COLUMNS):  # perhaps the wanted one
+        return {name: np.array([f"{array.dtype} of shape {shape}"], dtype=object)}
+    if kind == "O":
+        array = array.astype(str).astype(object)
+    if len(shape) == 1:
         return {name or "1": array}
-    rows = array if array.shape[0] < array.shape[1] else array.T
-    return {f"{name} {k + 1}".strip(): row for k, row in enumerate(rows)} if len(rows) <= MOST_COLUMNS else {}
+    rows = array if shape[0] < shape[1] else array.T
+    return {f"{name} {k + 1}".strip(): row for k, row in enumerate(rows)}
 
 
 def table_of(parts: Iterable[Part]) -> Table:
@@ -119,7 +122,8 @@ def table_of(parts: Iterable[Part]) -> Table:
             name, unit = heading(text)
             if name in columns:
                 raise Unreadable(f'has two columns called "{name}", or one in pieces; rename one, or export one piece')
-            columns[name], units[name] = cells, part.unit or unit
+            is_clear = not unit or part.unit in ("", unit)
+            columns[name], units[name] = cells, (part.unit or unit) if is_clear else ""
             steps.add(part.step)
     step = max(steps, default=0.0)
     return Table(columns, units, 1 / step if step > 0 and len(steps) == 1 else None)

@@ -4,7 +4,9 @@ For ẍ + 2ζω ẋ + ω²(1 + ξ) x = 0 averaging over the phase leaves of ln�
 
     λ = −ζω + ω²S(2ω)/8,   Λ(p) = −ζω p + p(p + 2) ω²S(2ω)/16.
 
-For noise in the damping, ẍ + (2ζω − ξ) ẋ + ω²x = 0,
+There ξ is a relative stiffness. If the support of a pendulum has the acceleration a upward, it is a/g, as ω² = g/ℓ. For
+a ship's roll it is ΔGM/GM. The ξ of `ParametricOscillator` is ω² times it. For noise in the damping,
+ẍ + (2ζω − ξ) ẋ + ω²x = 0,
 
     λ = −ζω + S(2ω)/8,   Λ(p) = −ζω p + p(p + 2) S(2ω)/16 + p² S(0)/8.
 
@@ -80,44 +82,3 @@ def checked_positive(name: str, value: float) -> float:
     if not real_number(value, name) > 0:
         raise ValueError(f"got {name} = {shown(value)}; must be a number > 0 and finite")
     return float(value)
-
-
-def of_relative_stiffness(omega: float) -> float:
-    """ω², by which a relative stiffness, dimensionless, becomes the ξ of `ParametricOscillator`, in 1/time².
-
-    Args:
-        omega: natural frequency, in rad/time.
-
-    Raises:
-        ValueError: it is not > 0 and finite.
-    """
-    return checked_positive("omega", omega) ** 2
-
-
-def of_support_acceleration(gravity: float = GRAVITY) -> float:
-    """1/g, by which the vertical acceleration of the support of a pendulum becomes a relative stiffness.
-
-    A pendulum of length ℓ whose support has the acceleration a upward obeys ϑ̈ + 2ζω ϑ̇ + ((g + a)/ℓ) ϑ = 0, so that
-    ω² = g/ℓ and ξ = a/g; the ξ of `ParametricOscillator` is a/ℓ = ω²a/g.
-
-    Args:
-        gravity: g, in the unit of the acceleration; that of m/s² if omitted.
-
-    Raises:
-        ValueError: it is not > 0 and finite.
-    """
-    return 1 / checked_positive("gravity", gravity)
-
-
-def of_stability_height(metacentric_height: float) -> float:
-    """1/GM, by which a variation ΔGM of the metacentric height of a ship becomes a relative stiffness of its roll.
-
-    Roll obeys ϑ̈ + 2ζω ϑ̇ + ω²(GM + ΔGM)/GM ϑ = 0, so that ξ = ΔGM/GM.
-
-    Args:
-        metacentric_height: GM, in the unit of ΔGM.
-
-    Raises:
-        ValueError: it is not > 0 and finite.
-    """
-    return 1 / checked_positive("metacentric_height", metacentric_height)

@@ -22,9 +22,6 @@ from fpsolve.measured import (
     Verdict,
     fit_noise,
     non_gaussian_from_record,
-    of_relative_stiffness,
-    of_stability_height,
-    of_support_acceleration,
     verdict,
     weak_exponent,
     weak_moment,
@@ -32,7 +29,7 @@ from fpsolve.measured import (
 from fpsolve.measured.fit import NAMES, slopes_of
 from fpsolve.measured.signals import SIGNALS
 from fpsolve.measured.stability import STEPS
-from fpsolve.measured.weak import Where, frequencies_that_matter
+from fpsolve.measured.weak import GRAVITY, Where, frequencies_that_matter
 from fpsolve.messages import Code, Message
 from fpsolve.model import ImpactLaw, ParametricOscillator, PlaneSystem, Problem, VibroImpactOscillator
 from fpsolve.model.plane import STEADY, System
@@ -223,8 +220,7 @@ def measure(data: Spectrum | Record, wanted: Wanted, progress: Callable[[], None
 
 def _fit(data: Spectrum | Record, wanted: Wanted) -> NoiseFit:
     """The noise of the relative stiffness, or of the damping. Raises `ValueError`, `FpsolveError`."""
-    factor = of_support_acceleration() if wanted.of == "acceleration" else 1.0
-    converted = data.scaled(factor if wanted.height is None else of_stability_height(wanted.height))
+    converted = data.scaled(1 / (wanted.height or (GRAVITY if wanted.of == "acceleration" else 1.0)))
     if wanted.kind != NON_GAUSSIAN:
         return fit_noise(
             converted, wanted.kind, frequency=wanted.modes.omega[0], second_frequency=wanted.modes.second,
@@ -240,7 +236,7 @@ def _fit(data: Spectrum | Record, wanted: Wanted) -> NoiseFit:
 def _factor(wanted: Wanted) -> float:
     """What the relative stiffness, or the damping, is multiplied by to be ξ of the system."""
     if wanted.noise_unit == "1/time²":
-        return of_relative_stiffness(wanted.modes.omega[0])
+        return wanted.modes.omega[0] ** 2
     return 1 / wanted.case.system.linear().epsilon if wanted.case and wanted.noise_unit == "1/time" else 1.0
 
 

@@ -298,7 +298,7 @@ RECORDS = {
     "struct.mat": (saved(lambda file: savemat(file, {"tower": {"t": T, "a": X, "note": "text"}})), G,
                    {"over": "tower.t", **UNSAID}),
     "level 7.3.mat": (hdf({"a": X[:, None], "t": T[:, None]}), G, UNSAID),
-    "strain.h5": (hdf({"strain/Strain": X}, Xspacing=1 / RATE, Yunits="g"), G, {}),
+    "strain.h5": (hdf({"strain/Strain": X}, units="g"), G, {"rate": RATE}),
     "plain.npy": (arrays(np.save, arr=np.column_stack([T, X])), G, {"over": "1", **UNSAID}),
     "values.npy": (arrays(np.save, arr=np.r_[9.0, X]), 1.0, {"rate": RATE, "skip": 1, "unit": "m/s^2"}),
     "datetime.nc": (
@@ -349,7 +349,7 @@ SPECTRA = {
     "units below.csv": ("frequency,PSD\nHz,g^2/Hz\n" + FDA, G**2, {}),
     "kilohertz.csv": ("f (kHz),G (g^2/Hz)\n" + rows(F / 1000, D), G**2, {}),
     "stated.csv": ("f (Hz),G\n" + FDA, G**2, {"unit": "g^2/Hz"}),
-    "root.txt": (rows(F, np.sqrt(D), form="{:.17g}"), G**2, {"over": "1", "unit": "g/sqrt(Hz)"}),
+    "root.txt": (rows(F, np.sqrt(D), form="{:.17g}"), G**2, {"over": "1", "per": "Hz", "unit": "g/sqrt(Hz)"}),
     "columns.csv": ("n,f (Hz),lower,G ((m/s^2)^2/Hz)\n" + rows(F, F, D, D), 1.0, {"column": "G"}),
     "channels.csv": (
         "f (Hz),1,2,3,4,5\n" + rows(F, F, F, D, F, F), 1.0, {"of": "stiffness", "column": "3", "unit": "1/Hz"}
@@ -432,6 +432,16 @@ def test_nothing_that_changes_a_number_is_assumed(kind, name, left, tmp_path):
         assert kind == "spectrum" or found.step == pytest.approx(1 / RATE, rel=1e-9)
 
 
+@pytest.mark.parametrize("shift", [0.0, EPOCH])
+def test_times_that_are_not_quite_even_are_taken_with_a_note(shift, tmp_path):
+    even = shift + np.arange(1000) / 30
+    for times in ([f"{each:.2f}" for each in even], even + 1e-3 * np.sin(np.arange(1000))):
+        text = "t (s),a (g)\n" + rows(times, X[:1000], form="{:.14g}")
+        found = read_record(written(tmp_path, "a.csv", text), of="acceleration")
+        assert found.step == pytest.approx(1 / 30, rel=1e-4)
+        assert re.search(r"a step off even ones, and the mean step 0\.033\d* s is taken; --rate", *found.notes)
+
+
 SAME = ("sheet.xlsx", "table.parquet", "matlab.mat", "matlab4.mat", "struct.mat", "bext.wav", "cf.nc", "58.unv",
         "tower.tdms", "tower.mseed", "knet.EW", "labview.lvm", "commas.csv")  # fmt: skip
 """Of each format one: its verdict is that of savetxt.csv."""
@@ -453,18 +463,6 @@ def test_same_record_in_another_format_has_the_same_verdict(name, tmp_path):
     assert verdict(name) == pytest.approx(verdict("savetxt.csv"), rel=1e-9)
 
 
-@pytest.mark.parametrize("shift", [0.0, EPOCH])
-def test_times_that_are_rounded_or_not_quite_even_are_taken_with_a_note(shift, tmp_path):
-    texts = {
-        "rounded": rows([f"{shift + k / 30:.2f}" for k in range(1000)], X[:1000]),
-        "jitter": rows([f"{shift + k / 30 + 0.0015 * math.sin(k):.5f}" for k in range(1000)], X[:1000]),
-    }
-    for name, text in texts.items():
-        found = read_record(written(tmp_path, f"{name}.csv", "t (s),a (g)\n" + text), of="acceleration")
-        assert found.step == pytest.approx(1 / 30, rel=1e-4)
-        assert re.search(r"a step off even ones, and the mean step 0\.033\d* s is taken; --rate", *found.notes)
-
-
 GAP = np.r_[0:1000, 1500:2048]
 HALF = np.sort(np.random.default_rng(0).permutation(2048)[:1024])
 DAMAGED = bytearray(arrays(np.savez_compressed, f=F))
@@ -477,6 +475,15 @@ BAD_RECORDS = {
     "a name over commas.csv": ("acc\n" + COMMAS, {"rate": RATE}, "has 2 columns of values"),
     "rows.csv": ("Scale Factor 3920(gal)/6182761\n" + along(range(800)), {"rate": RATE}, f"{COLUMN}, or --by rows"),
     "days.csv": ("t,a\n" + rows(["01.03.2026 12:00:00"] * 99, X[:99]), {}, "do not increase"),
+    "clock of two.csv": ("t,a (g)\n" + rows([f"00:{k:02d}" for k in range(60)], X[:60]), {}, "no unit of the times"),
+    "clock of commas.csv": (
+        "t;a (g)\n" + rows([f"12:00:{k:02d},5" for k in range(60)], X[:60], separator=";"), {}, "no unit of the times"
+    ),
+    "mixed.csv": ("t (s);a (g)\n" + rows(T, [f"{x:.2f}".replace(".", ",") for x in X], separator=";"), {}, "one dec"),
+    "names like units.csv": ("Station,MM01\nt,h\n" + TXA, {"rate": RATE, "column": "Station"}, 'no column "Station"'),
+    "limits.txt": ("Sensor range / g\nPeak value 0.34 (g)\n" + rows(X), {"rate": RATE}, "no unit of the column 1"),
+    "twice.csv": ("t (s),a (g)\n" + rows(T[np.r_[:1000, 999:2047]], X), {}, "uneven steps"),
+    "a text.npy": (arrays(np.save, arr=X), {"names": "a (g)"}, "is no text, of which --names"),
     "gap.csv": ("t (s),a (g)\n" + rows(T[GAP], X[GAP]), {}, r"uneven steps, 10.02 s at line 1002"),
     "gap unix.csv": ("t (s),a (g)\n" + rows(unix(1, 3, T[GAP]), X[GAP]), {}, r"uneven steps, 10.02 s at line 1002"),
     "half is missing.csv": ("t (s),a (g)\n" + rows(unix(1, 3, T[HALF]), X[HALF]), {}, "uneven steps"),
@@ -498,10 +505,10 @@ BAD_RECORDS = {
     "counter.csv": ("Sample,a (g)\n" + rows(range(T.size), X), {"column": "a"}, "no times of its values; state --rate"),
     "rate.csv": ("# 50 Hz\n" + rows(X), {}, r"\(it has '50 Hz'\); state --rate, in values per second"),
     "volts.csv": ("t (s),a (V)\n" + TXA, {}, r"state --unit m/s\^2 and --scale, how many m/s\^2 one V stands for"),
-    "other signal.csv": ("t (s),a (mm)\n" + TXA, {}, "state --of height"),
+    "other signal.csv": ("t (s),a (mm)\n" + TXA, {}, "or another --of"),
     "decibel.csv": ("t (s),a (dB)\n" + TXA, {}, r'the unit "dB", which is not known; its values are levels'),
     "prose.txt": ("nothing was measured today\nnor tomorrow\n", {}, "has no table of numbers"),
-    "value.csv": (f"t (s),a (g)\n{TXA}{T[-1] + 1 / RATE},nan\n", {}, "has no number in the column a, line 2050"),
+    "value.csv": (f"t (s),a (g)\n{TXA}{T[-1] + 1 / RATE},nan\n", {}, 'has "nan" in the column a, line 2050'),
     "several.csv": ("t,left,right\n" + rows(T, X, X), {}, f"has 2 columns of values; {COLUMN}"),
     "misspelt.csv": (
         "t,left,right\n" + rows(T, X, X),
@@ -518,8 +525,17 @@ BAD_SPECTRA = {
     "binary.csv": (b"\0\1\2", ONE, "is binary"),
     "one line.csv": ("f,G\n", ONE, "has no table of numbers"),
     "long row.csv": ("f,G\n1,2\n2,3\n3,4,5\n6,7\n7,8\n", ONE, r":4: is no table of 2 columns"),
-    "short row.csv": ("f,G\n1,2\n3\n", {"unit": "1/Hz", **ONE}, "has no number in the column G, line 3"),
-    "word.csv": ("f,G\n1,2\n3,x\n", {"unit": "1/Hz", **ONE}, r'has "x" in the column G, line 3; write a number'),
+    "short row.csv": ("f,G\n1,2\n2,3\n3\n4,5\n5,6\n", ONE, ":4: is no table of 2 columns"),
+    "word.csv": ("f,G\n1,2\n3,x\n4,5\n5,6\n", {"unit": "1/Hz", **ONE}, 'has "x" in the column G, line 3; write a'),
+    "trailer.csv": ("f,G\n1,2\n3,4\n4,5\nMean,3.7\n", ONE, ":5: is no table of 2 columns of numbers"),
+    "quote.csv": ('f,G,n\n1,2,a\n3,4,"b\n4,5,"c\n5,6,d\n6,7,e\n', ONE, "is no table of 3 columns"),
+    "rpm.csv": ("f (rpm),G (1/Hz)\n" + FDA, {"sided": "one"}, 'has the unit "rpm", which is not known'),
+    "periods.csv": ("T (s),G (1/Hz)\n" + FDA, {"sided": "one", "over": "T"}, 'has the unit "s", and not Hz'),
+    "two frequencies.csv": ("low (Hz),f (Hz),G (1/Hz)\n" + rows(F, F, D), {**ONE, "column": "G"}, "2 columns of frequ"),
+    "arithmetic.csv": ("f (Hz),10 log10 G (1/Hz)\n" + FDA, ONE, "no unit of the column 10 log10 G"),
+    "two units.csv": ("f (Hz),G (g^2/Hz)\nHz,1/Hz\n" + FDA, ONE, "no unit of the column G"),
+    "complex.npz": (arrays(f=F, S=D + 1j, coherence=D), ONE, f"has 2 columns of values; {COLUMN}"),
+    "sizes.npz": (arrays(f=F, S=D[1:]), {"unit": "1/Hz", **ONE}, "has 160 frequencies in f and 159 values in S"),
     "twice.csv": ("f,f\n1,2\n2,3\n", ONE, 'two columns called "f"'),
     "twice.npz": (arrays(**{"G (g)": D, "G (m)": D}), ONE, 'two columns called "G"'),
     "archive.npy": (arrays(np.save, arr=np.array("text")), ONE, "has no columns of real numbers"),
@@ -530,13 +546,13 @@ BAD_SPECTRA = {
     "damaged.npz": (bytes(DAMAGED), ONE, "is no file that numpy reads"),
     "texts.npz": (arrays(f=np.array(["a"])), ONE, "has no columns of real numbers"),
     "objects.npy": (arrays(np.save, arr=np.array([{}], dtype=object)), ONE, "Object arrays cannot be loaded"),
-    "record.wav": (wav(), ONE, "state --over, or a record by --record"),
+    "record.wav": (wav(), ONE, "or a record by --record"),
     "text.wav": (b"RIFF" + struct.pack("<I", 4) + b"none", ONE, "is no file that scipy reads"),
     "text.mat": (b"x" * 200, ONE, "is no file that scipy reads"),
     "new.mat": (b"MATLAB 7.3 MAT-file" + b" " * 200, ONE, "is no file that scipy reads"),
     "text.nc": (b"CDF\1" + b"x" * 100, ONE, "is no file that xarray reads"),
     "hdf.nc": (b"\x89HDF\r\n\x1a\n" + b"x" * 100, ONE, "is no file that xarray reads"),
-    "waves.nc": (WAVES, {"of": "height", "sided": "one"}, "its columns are time, freq, dir"),
+    "waves.nc": (WAVES, {"of": "height", "sided": "one"}, "its columns are efth, time, freq, dir"),
     "text.uff": (b"    -1\n    58\nnothing\n    -1\n", ONE, "is no file that pyuff reads"),
     "latin.uff": (uff(9, F, D, "m/s\xb2"), ONE, "which is not known"),
     "a.xlsx": (b"PK", ONE, "is no file that openpyxl reads"),
@@ -545,7 +561,7 @@ BAD_SPECTRA = {
     "a.lvm": (b"LabVIEW Measurement", ONE, "is no file that lvm_read reads"),
     "a.bin": (b"\0\1\2", ONE, "is no file that obspy reads"),
     "sides.csv": ("f (Hz),G (1/Hz)\n" + FDA, {}, "one-sided"),
-    "root.txt": (rows(F, np.sqrt(D)), ONE, "states no column of frequencies; state --over"),
+    "root.txt": (rows(F, np.sqrt(D)), ONE, "has no columns of frequencies; state one by --over"),
     "no density.csv": ("f (Hz),G\n" + FDA, ONE, "no unit of the column G; state --unit, such as 1/Hz"),
     "no unit.csv": ("f,G (s)\n" + FDA, {"sided": "one"}, "no unit of the frequencies f; state --per, Hz or rad/s"),
     "inverse.csv": ("f (1/s),G (s)\n" + FDA, {"sided": "one"}, "no unit of the frequencies f"),
@@ -554,13 +570,13 @@ BAD_SPECTRA = {
     "volts.csv": ("f (Hz),G (V^2/Hz)\n" + FDA, ONE, r'the unit "V\^2/Hz", which is none of a density'),
     "signal.csv": ("f (Hz),G (m/s^2)\n" + FDA, {"of": "acceleration", **ONE}, r"such as \(m/s\^2\)\^2/Hz"),
     "levels.csv": ("f (Hz),RIN (dBc/Hz)\n" + FDA, ONE, r"values are levels L: convert them, G = 10\^\(L/10\)"),
-    "t.csv": ("t (s),G (1/Hz)\n" + FDA, ONE, "state --over, or a record by --record; its columns are t, G"),
+    "t.csv": ("t (s),G (1/Hz)\n" + FDA, ONE, "or a record by --record; its columns are t, G"),
     "f.csv": ("f (Hz),G\n" + FDA, {**ONE, "column": "f"}, 'no column "f"; there are G'),
     "channels.csv": ("f (Hz),1,2,3,4,5\n" + rows(F, *[D] * 5), ONE, f"5 columns of values; {COLUMN}"),
     "on its side.txt": (  # a row for each time, as buoys write them
         "#YY MM DD " + rows(*F[:, None], separator=" ") + 3 * rows(["2026 03 01"], *D[:, None], separator=" "),
         ONE,
-        "states no column of frequencies",
+        "has no columns of frequencies",
     ),
     **{  # which would take for ever, or is none
         f"{k}.csv": (f"f (Hz),G [{unit}]\n{FDA}", ONE, "which is not known")

@@ -1,6 +1,7 @@
 """Internals of measurements: kinds that are fitted, arrays of MATLAB, libraries that are missing, memory."""
 
 import os
+import pickle
 
 import numpy as np
 import pytest
@@ -39,7 +40,8 @@ def test_arrays_of_matlab_of_all_types_are_read_and_the_rest_is_left_out(tmp_pat
         "wide 1": first,
         "wide 2": second,
         "deep.x": first,
-        "cell": [1, "a"],
+        "cell": ["1", "a"],
+        "cube": ["float64 of shape (2, 2, 2)"],
     }
     assert found == expected
 
@@ -59,3 +61,16 @@ def test_file_that_would_take_all_memory_is_refused(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", a=np.zeros(2**27))
     with pytest.raises(FpsolveError, match="is no file that numpy reads"):
         read_record(tmp_path / "a.npz", rate=1.0, unit="1")
+
+
+@pytest.mark.parametrize("name", ["a.mseed", "a.lvm.pkl"])
+def test_a_pickle_in_the_place_of_a_file_or_beside_it_is_not_run(name, tmp_path):
+    class Runs:
+        def __reduce__(self):
+            return os.mkdir, (str(tmp_path / "made"),)
+
+    (tmp_path / "a.lvm").write_text("LabVIEW Measurement\t\n", encoding="utf-8")
+    (tmp_path / name).write_bytes(pickle.dumps(["obspy.core.stream", Runs()]))
+    with pytest.raises(FpsolveError, match="is no file that"):
+        read_record(tmp_path / name.removesuffix(".pkl"))
+    assert not (tmp_path / "made").exists()

@@ -14,10 +14,6 @@ from fpsolve.measured import (
     fit_noise,
     named_spectrum,
     non_gaussian_from_record,
-    of_relative_stiffness,
-    of_stability_height,
-    of_support_acceleration,
-    read_spectrum,
     verdict,
     weak_exponent,
     weak_moment,
@@ -179,7 +175,6 @@ REFUSED = [
     (lambda: fitted(exact(OU), terms=3), "terms"),
     (lambda: fitted(exact(OU), noise_in="mass"), "noise_in"),
     (lambda: fitted([1, 2]), "Spectrum or a Record"),
-    (lambda: of_relative_stiffness(-1), "omega = -1"),
     *[
         (lambda values=values: non_gaussian_from_record(Record(values, 1.0)), said)
         for values, said in (
@@ -197,12 +192,6 @@ def test_measurement_that_tells_no_noise_is_refused(make, said):
         make()
 
 
-def test_factors_of_signals_are_those_of_a_pendulum_and_of_a_ship():
-    """ω²ξ = a/ℓ for a pendulum, ω² = g/ℓ; ξ = ΔGM/GM."""
-    assert of_relative_stiffness(3.0) * of_support_acceleration() == pytest.approx(9.0 / 9.80665)
-    assert of_stability_height(0.5) == 2.0
-
-
 def test_fit_of_a_scaled_signal_is_the_scaled_fit():
     fit, other = fitted(exact(PEAK), PEAK).scaled(4.0), fitted(exact(PEAK).scaled(4.0), PEAK)
     assert fit.parameters == pytest.approx(other.parameters, rel=1e-3)
@@ -213,7 +202,7 @@ def test_fit_of_a_scaled_signal_is_the_scaled_fit():
 def test_verdict_has_the_error_of_weak_noise():
     """With S known up to a share e at 2ω, Λ(2) = −2ζω + ω²S/2 has the error ω²S e/2."""
     omega, zeta, noise = 2.0, 0.01, OrnsteinUhlenbeck(alpha=1.5, sigma=0.05)
-    fit = fitted(exact(noise, error=0.25)).scaled(of_relative_stiffness(omega))
+    fit = fitted(exact(noise, error=0.25)).scaled(omega**2)
     found = verdict(Problem(ParametricOscillator(stiffness=omega**2, damping=zeta * omega), fit.noise), fit)
     at_double = noise.spectral_density(2 * omega)
     assert found.exponent.value == pytest.approx(weak_exponent(omega, zeta, at_double, "stiffness"), abs=1e-5)
@@ -249,12 +238,3 @@ def test_fit_of_the_sea_by_filters_states_its_misfit(terms, most):
     # that of a band 10 % wide each way
     assert right / fit.spectral_density(2 * omega) - 1 == pytest.approx(misfit.relative, abs=0.25)
     assert abs(misfit.relative) < most
-
-
-def test_break_points_are_joined_by_straight_lines_in_the_logarithms(tmp_path):
-    (tmp_path / "a.csv").write_text("f (Hz),G (g^2/Hz)\n10,0.01\n50,0.04\n500,0.04\n2000,0.01\n", encoding="utf-8")
-    found = read_spectrum(tmp_path / "a.csv", sided="one", of="acceleration", log_log=True)
-    f, density = found.frequencies / (2 * math.pi), 2 * found.density / 9.80665**2
-    assert np.interp(100.0, f, density) == pytest.approx(0.04)
-    rising = f < 50
-    assert density[rising] == pytest.approx(0.01 * (f[rising] / 10) ** (math.log(4) / math.log(5)), rel=1e-9)
