@@ -68,7 +68,7 @@ def parse(text: str, *, skip: int = 0, names: str = "", by_rows: bool = False) -
         wrong = next((i for i, line in rows if len(cells_of(line, separator)) != count), None)
     if wrong or len(frame) < len(rows) or len(decimals) > 1 or not is_row(rows[-1][1]):
         told = f"is no table of {count} columns of numbers with one decimal sign to its end"
-        raise Unreadable(f"{told}; complete the row, or remove it", wrong or rows[-1][0])
+        raise Unreadable(f"{told}; complete or remove the row, or state --by rows", wrong or rows[-1][0])
     kept = [k for k in frame if not frame[k].isna().all()]
     table = table_of(Part(found[k], frame[k].to_numpy(), units[k]) for k in kept)
     return replace(table, above=above, lines=[i for i, _ in rows])
