@@ -1,4 +1,4 @@
-"""The page of all keys of case files, from the declarations that check them: `python docs/keys.py` writes it anew."""
+"""The page of all keys of case files, from the declarations that check them: `python docs/keys.py` writes it."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _fields(fields) -> str:
 
 def keys() -> str:
     """Every key of a case file, from the declarations that check it."""
-    about = "What a case file may say, from the code that checks it; [Case files](cases.md) has examples."
+    about = "These are all keys of a case file, from the code that checks them. [Case files](cases.md) has examples."
     text = f"# Keys\n\n{about}\n\n## Sections\n{_fields(Case.model_fields)}"
     for name in SYSTEMS:
         kind = system_kind(name)
@@ -93,7 +93,7 @@ def _section_of(annotation):
 def _first(item) -> str:
     first = (inspect.getdoc(item) or "").partition("\n\n")[0].replace("\n", " ").replace("*", "\\*").replace("`[", "[")
     text = re.sub(r"^\[+\w+\]+: ", "", first)  # the heading names the section
-    return text[:1].upper() + text[1:]
+    return re.sub(r"^([a-z]{2,}|a)\b", lambda word: word[0].capitalize(), text)  # a symbol keeps its case
 
 
 if __name__ == "__main__":

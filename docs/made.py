@@ -9,7 +9,7 @@ import re
 import shutil
 from pathlib import Path
 
-from keys import default_of, range_of, row, table
+from keys import PAGE, default_of, keys, range_of, row, table
 from sphinx_gallery.scrapers import figure_rst
 
 import fpsolve
@@ -48,6 +48,7 @@ def write_all(folder: Path) -> None:
     write_reference(folder / "reference")
     _write(folder / "expected.part.md", expected())
     _write(folder / "oracles.part.md", oracles())
+    _write(PAGE, keys())
 
 
 def _write(path: Path, text: str) -> None:
