@@ -1,5 +1,6 @@
 """How Sphinx builds this site: `sphinx-build -W docs OUT`. What is made from the code is in `made.py`."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -73,9 +74,15 @@ html_theme_options = {
 }
 
 
+def link_tutorials_of_the_site(app, page, text):
+    """Lead links to the tutorials in Markdown, which a code host shows, to their pages here, which have figures."""
+    text[0] = re.sub(r"\]\(tutorials/(\w+)\.md\)", r"](generated/tutorials/\1.rst)", text[0])
+
+
 def setup(app):
     """Make the pages that follow from the code before the galleries look for theirs."""
     made.write_all(Path(__file__).parent / "generated")
+    app.connect("source-read", link_tutorials_of_the_site)
     app.connect("autodoc-process-docstring", made.plain_docstring, priority=100)
     app.connect("autodoc-process-docstring", made.plain_types, priority=900)
     app.connect("autodoc-process-docstring", made.parameter_list, priority=900)

@@ -44,7 +44,7 @@ for key, slope in sensitivities(problem, 2.0).moments[0].items():
 # %%
 # As matrices
 # -----------
-# The same system can be stated by matrices, :math:`\dot x = (A_0 + \xi_1 A_1 + \ldots)\,x`. A term has an order in
+# Matrices can state the same system, :math:`\dot x = (A_0 + \xi_1 A_1 + \ldots)\,x`. A term has an order in
 # :math:`\varepsilon`, a matrix, a function of the noise and the name of the noise. The two numbers must agree.
 stiffness = ((0.0, 0.0), (-1.0, 0.0))
 
@@ -78,7 +78,7 @@ print("lambda with a wall:   ", lyapunov_exponent(walled))
 # %%
 # An independent check
 # --------------------
-# The simulation moves paths of the system itself. It shares no line of code with the finite elements. Compare the two
+# The simulation moves paths of the system itself. It shares no solver code with the finite elements. Compare the two
 # results in units of the standard error.
 alone = Problem(PlaneSystem.of_equations(("x", "v"), ("v", "-x - 0.2*v - xi*x")), Telegraph(a=0.5, k=1.0))
 expected = moment_lyapunov(alone, 1.0).value[0]

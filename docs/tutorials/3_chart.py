@@ -17,8 +17,8 @@ from fpsolve.model import White
 # %%
 # Two lines
 # ---------
-# ``boundary`` looks for a line on a grid and then follows it with its gradient. The lines here are simple, so that a
-# coarse grid of 5 × 5 nodes is enough; the default is 13 × 13.
+# ``boundary`` looks for a line on a grid and then follows it with its gradient. The lines here are simple: a coarse
+# grid of 5 × 5 nodes is enough. The default is 13 × 13.
 system = PlaneSystem.of_equations(("x", "v"), ("v", "-x - 2*b*v - xi*x"), {"b": 0.1})
 problem = Problem(system, White(s=0.5))
 frame = Axis("noise.s", 0.3, 1.2), Axis("system.b", 0.02, 0.3)
@@ -26,7 +26,7 @@ paths = boundary(problem, "lyapunov_exponent = 0", *frame, nodes=5)
 square = boundary(problem, "moment(2) = 0", *frame, nodes=5)
 
 # %%
-# Every point of a line is solved to 1e-10 of the scale. So the line must agree with the known one:
+# ``boundary`` solves every point to 1e-10 of the scale. So the line must agree with the known one:
 branch = square.branches[0]
 print("largest distance from s^2 = 4 b:", np.max(np.abs(branch.x**2 - 4 * branch.y)))
 assert np.allclose(branch.x**2, 4 * branch.y, rtol=1e-7)
@@ -45,8 +45,8 @@ axes.text(1.08, 0.06, "almost every\npath grows", ha="center")
 axes.legend(loc="lower right")
 
 # %%
-# The region between the two lines is dangerous: a test of a few specimens shows decay, but the mean square, and so the
-# mean energy, grows. It grows by rare large excursions.
+# The region between the two lines is dangerous. A test of a few specimens shows decay, but the mean square and the mean
+# energy grow, by rare large excursions.
 for s in (0.5, 0.8, 1.1):
     here = problem.at({"noise.s": s})
     paths, square = lyapunov_exponent(here).value, moment_lyapunov(here, 2.0).value[0]
@@ -54,4 +54,4 @@ for s in (0.5, 0.8, 1.1):
 
 # %%
 # On the command line ``fpsolve chart cases/systems/white_noise_chart.toml`` makes this chart. It also names and shades
-# the regions, see :doc:`/guide/charts`. Next: :doc:`a thousand sets <4_sweep>`.
+# the regions, see :doc:`/guide/charts`. Next: :doc:`a thousand parameter sets <4_sweep>`.

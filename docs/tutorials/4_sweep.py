@@ -1,8 +1,8 @@
 r"""
-4. A thousand sets
-==================
+4. A thousand parameter sets
+============================
 
-A sweep solves a case for many sets of parameters. This tutorial makes a thousand of them from one case file, solves
+A sweep solves a case for many parameter sets. This tutorial makes a thousand of them from one case file, solves
 them, and looks at the result with xarray.
 """
 
@@ -18,7 +18,7 @@ import fpsolve
 # A case with two varied keys
 # ---------------------------
 # ``[vary]`` with ``mode = "product"`` makes all combinations of 40 frequencies and 25 intensities. ``quantities`` names
-# what is wanted; nothing else is computed.
+# the numbers to compute, and fpsolve computes no others.
 CASE = """
 title = "A thousand oscillators"
 
@@ -52,8 +52,8 @@ folder = Path(tempfile.mkdtemp())
 # %%
 # Solve
 # -----
-# ``jobs=None`` uses all processors. Each finished set is written at once: if the process is killed, the same line
-# goes on where it stopped. The command is ``fpsolve run thousand.toml``.
+# ``jobs=None`` uses all processors. fpsolve writes each finished set at once: if you kill the process, the same line
+# resumes it. The command is ``fpsolve run thousand.toml``.
 results = fpsolve.run(folder / "thousand.toml", folder / "results", jobs=None)
 print(len(results), "sets")
 
@@ -75,7 +75,7 @@ moment.plot.contour(**sides, levels=[0], colors="black")
 axes.set(yscale="log", title=r"$\Lambda(2)$, and where it is zero")
 
 # %%
-# For how many of the thousand sets does almost every path decay, but the mean square grow?
+# For how many of the sets does almost every path decay, but the mean square grow?
 both = (found.lyapunov_exponent < 0) & (found.moment.sel(p=2.0) > 0)
 print(int(both.sum()), "of", both.size)
 

@@ -30,9 +30,8 @@ from fpsolve.analysis import Axis
 from fpsolve.model import OrnsteinUhlenbeckByDeviation, ParametricOscillator
 from tests.contract.test_cases import CASES, ROOT
 from tests.kit import case_in, rates, solve_case
+from tests.prose import CODE, PAGES, hard, texts
 
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs").glob("[!g]*/*.md"))]
-PAGES += sorted((ROOT / "docs/guide").glob("*.md"))
 LONG = "guide/response", "guide/charts", "guide/python"
 
 
@@ -43,7 +42,11 @@ def blocks(page, language):
 def named(language):
     """Pages that have such blocks; those that take some seconds are slow."""
     known = {page: f"{page.parent.name}/{page.stem}" for page in PAGES if blocks(page, language)}
-    return [pytest.param(page, id=name, marks=[pytest.mark.slow] * (name in LONG)) for page, name in known.items()]
+    return [
+        pytest.param(page, id=name, marks=[pytest.mark.slow] * (name in LONG))
+        for page, name in known.items()
+        if "tutorials" not in name
+    ]
 
 
 @cache
@@ -142,3 +145,23 @@ def test_noise_and_system_of_the_page_on_extending_are_what_those_that_ship_are(
     ):
         assert_allclose(found(own, "noise.size"), found(known, "noise.standard_deviation"), rtol=1e-9)
     explore(own).close()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)  # then [*PAGES, *PRINTED]
+def test_no_sentence_is_hard(page):
+    assert hard(page) == []
+
+
+def test_messages_that_the_page_of_words_quotes_are_printed():
+    quoted = re.findall(r'"([^"\n]+)"', (ROOT / "docs/guide/words.md").read_text(encoding="utf-8"))
+    printed = "\n".join(text for path in CODE.rglob("*.py") for text in texts(path))
+    assert [each for each in quoted if each not in printed] == [] != quoted
+
+
+def test_tutorials_in_markdown_are_those_of_the_site():
+    made = runpy.run_path(str(ROOT / "docs/tutorial_pages.py"))
+    for script in made["SCRIPTS"]:
+        page = re.sub(
+            r"```text\n.*?```\n\n", "", script.with_suffix(".md").read_text(encoding="utf-8"), flags=re.DOTALL
+        )
+        assert page == made["page"](script), "type `python docs/tutorial_pages.py`"
