@@ -10,7 +10,7 @@ from typing import get_args
 from fpsolve.case import Case
 from fpsolve.exponent import Budget
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
-from fpsolve.model.parameters import example_of, meaning_of, symbol_of
+from fpsolve.model.parameters import example_of, meaning_of
 
 PAGE = Path(__file__).parent / "reference/keys.md"
 
@@ -53,7 +53,7 @@ def _fields(fields) -> str:
         default = "" if each.is_required() else each.get_default(call_default_factory=True)
         default = "" if default in (None, "", ()) or default_of(default) == "..." else f"`{default_of(default)}`"
         required = "**required**" if each.is_required() else default
-        symbol = symbol_of(each)
+        symbol = dict(each.json_schema_extra or {}).get("symbol")
         meaning = f"{symbol}: {meaning_of(each)}" if symbol else meaning_of(each)
         example = example_of(each)
         text += row(f"`{name}`", meaning, range_of(each), required, f"`{example}`" if example else "")
@@ -67,14 +67,18 @@ def keys() -> str:
     for name in SYSTEMS:
         kind = system_kind(name)
         text += f'\n## `[system]` with `kind = "{name}"`\n\n{_first(kind)}\n'
-        text += _fields({**kind.stated, **kind.fields()})
+        text += _fields({**kind.stated, **kind.__pydantic_fields__})
     for name in NOISES:
         usual = noise_kind(name)
         for kind in (usual, *usual.variants):
-            own = [f"`{key}`" for key in kind.fields() if kind is not usual and key not in usual.fields()]
+            own = [
+                f"`{key}`"
+                for key in kind.__pydantic_fields__
+                if kind is not usual and key not in usual.__pydantic_fields__
+            ]
             by = f", stated by {' and '.join(own)}" if own else ""
             text += f'\n## `[noise]` with `kind = "{name}"`{by}\n\n{_first(kind)}\n'
-            text += _fields({**kind.stated, **kind.fields()})
+            text += _fields({**kind.stated, **kind.__pydantic_fields__})
     for section, field in Case.model_fields.items():
         made = Budget if section == "budget" else _section_of(field.annotation)
         if made is not None:

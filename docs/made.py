@@ -15,7 +15,7 @@ from sphinx_gallery.scrapers import figure_rst
 import fpsolve
 from fpsolve.commands import check_case
 from fpsolve.data import plain_unit
-from fpsolve.model.parameters import Parametrised, unit_of
+from fpsolve.model.parameters import Parametrised
 
 ROOT = Path(__file__).parents[1]
 CASES = [*sorted(ROOT.glob("cases/*.toml")), *sorted(ROOT.glob("cases/systems/*.toml"))]
@@ -310,8 +310,9 @@ def parameter_list(app, what, name, obj, options, lines):
     """Add the parameters of a kind of system or noise, with units and ranges."""
     if what != "class" or not (inspect.isclass(obj) and issubclass(obj, Parametrised)):
         return
-    for key, each in obj.fields().items():
-        unit = f", in {plain_unit(unit_of(each))}" if unit_of(each) else ""
+    for key, each in obj.__pydantic_fields__.items():
+        stated = dict(each.json_schema_extra or {}).get("unit")
+        unit = f", in {plain_unit(stated)}" if stated else ""
         about = f"{each.description}{unit}; {range_of(each)}" if range_of(each) else f"{each.description}{unit}"
         lines += ["", f"* ``{key}``: {_rst(about).replace(chr(92) * 2, chr(92))}"]
     lines.append("")

@@ -46,7 +46,7 @@ app = App(
     + "\n      ".join(f"{name:8}  {does}" for name, does in COMMANDS.items())
     + """
 
-    fpsolve COMMAND --help tells of its arguments, fpsolve --version of the version.
+    fpsolve COMMAND --help prints its arguments, fpsolve --version the version.
     With --traceback a command also prints where an error was raised.""",
     usage="Usage: fpsolve COMMAND",
     version=lambda: f"fpsolve {__version__}",

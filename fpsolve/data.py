@@ -91,6 +91,10 @@ class Quantity:
         """Its unit in a sentence; empty where it has none, or that is not known."""
         return "" if self.unit in ("1", "unknown") else plain_unit(self.unit)
 
+    def in_words(self, symbol: str = "") -> str:
+        """Its words, a symbol, and in brackets its unit, if it has one."""
+        return f"{self.words}{symbol}{f' ({self.unit_in_words})' if self.unit_in_words else ''}"
+
     def timed(self, unit: str) -> Self:
         """The quantity with a unit of time: "1/s" instead of "1/time"."""
         return replace(self, unit=re.sub(r"\btime(?=\b|²)", unit, self.unit))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from enum import Enum, StrEnum, unique
 from functools import partial
@@ -29,14 +30,14 @@ class Remedy(StrEnum):
     MESH = "use more cells ([mesh] phi_cells, xi_cells), a wider noise interval (xi_min, xi_max) or no [mesh]"
     CELLS = "use more cells in [mesh], or a smaller rtol where there is none"
     REACH = "use a [mesh] that reaches there, or no [mesh]"
-    BUDGET = "use a larger rtol or a larger [budget]"
+    BUDGET = "a larger rtol takes less"
     MANY = (
-        "use a larger rtol or a larger [budget]; p = 2 takes little and bounds it, as Λ(p) <= p Λ(2)/2 for 0 < p < 2 "
-        "and λ <= Λ(2)/2, and `fpsolve simulate` gives it with a standard error"
+        "a larger rtol takes less. Λ(2) takes little and bounds the others: Λ(p) <= p Λ(2)/2 for 0 < p < 2, λ <= "
+        "Λ(2)/2. `fpsolve simulate` estimates them"
     )
     BESIDE = (
-        "ask for p = -0.99 and p = -1.01 instead, as two eigenvalues may meet at p = -1; Λ(-1) is at most the mean of "
-        "both, as Λ(p) is convex"
+        "ask for p = -0.99 and p = -1.01 instead, as two eigenvalues may meet at p = -1. As Λ(p) is convex, Λ(-1) is "
+        "at most the mean of both"
     )
     SMALLER_RTOL = "use a smaller rtol"
     ROUNDING = "accept this accuracy, which rounding limits"
@@ -56,8 +57,8 @@ class Code(Enum):
     """What is said: a name, with its severity and the template of its words.
 
     A template is that of `str.format`. A value that is None is shown as nothing, one of several as a list; after "?" a
-    field has the words for a value that is there and, after "¦", for None or False. A `remedy` that the template does
-    not name ends the message. The datum `size` tells how bad it is.
+    field has the words for a value that is there and, after "¦", for None or False; "more2" is a limit that allows for
+    twice a value. A `remedy` that the template does not name ends the message. The datum `size` tells how bad it is.
     """
 
     def __init__(self, text: str) -> None:
@@ -69,81 +70,79 @@ class Code(Enum):
     SEVERAL = "failure: {reasons}"
 
     TAILS = (
-        "failure: {what} is not computed: for r0 > 1 the noise has algebraic tails, so that Λ(p) is infinite for p > 0 "
-        "and p < -1, and between is carried by paths far out, which a truncated domain does not hold; take λ, or "
-        "choose r0 <= 1, {remedy}"
+        "failure: {what} is not computed: for r0 > 1 the noise has algebraic tails. Λ(p) is infinite for p > 0 and p < "
+        "-1; between, paths far out carry it, beyond any truncated domain. Take λ, or choose r0 <= 1, {remedy}"
     )
     EVEN_ONLY = (
-        "failure: {what} is not computed: of {count} variables{is_struck:? under impulses¦} Λ(p) is found for even "
-        "p > 0 alone, by closed equations of moments; as Λ(p) is convex, λ <= Λ(2)/2 and Λ(p) <= (p/2) Λ(2) for "
-        "0 < p < 2; take even p, {remedy}"
+        "failure: {what} is not computed: of {count} variables{is_struck:? under impulses¦} fpsolve finds Λ(p) for "
+        "even p > 0 alone, by closed moment equations. As Λ(p) is convex, λ <= Λ(2)/2 and Λ(p) <= (p/2) Λ(2) for 0 < p "
+        "< 2. Take even p, {remedy}"
     )
     DELAY_ONLY = (
-        "failure: {what} is not computed: with a delay Λ(2) alone is found; as Λ(p) is convex, λ <= Λ(2)/2 and "
-        "Λ(p) <= (p/2) Λ(2) for 0 < p < 2; take p = 2, {remedy}"
+        "failure: {what} is not computed: with a delay fpsolve finds Λ(2) alone. As Λ(p) is convex, λ <= Λ(2)/2 and "
+        "Λ(p) <= (p/2) Λ(2) for 0 < p < 2. Take p = 2, {remedy}"
     )
     WALL_SIMULATED = (
-        "failure: {what} is not computed: at a wall of more than two variables moments obey no closed equations, and "
-        "there are elements for four variables alone, without impulses; leave out the wall, {remedy}"
+        "failure: {what} is not computed: at a wall of more than two variables the moment equations do not close. "
+        "There are finite elements for four variables alone, without impulses. Leave out the wall, {remedy}"
     )
     CONVEX_BOUNDS = (
-        "note: bounds, as Λ(p) is convex and Λ(0) = 0: λ <= Λ({p:g})/{p:g} <= {bound:.6g}, and "
-        "Λ(q) <= (q/{p:g}) Λ({p:g}) for 0 < q < {p:g}{root:?; δ_p is ¦}{root}"
+        "note: Λ(p) is convex, and Λ(0) = 0. Hence λ <= Λ({p:g})/{p:g} <= {bound:.6g}. Also Λ(q) <= (q/{p:g}) Λ({p:g}) "
+        "for 0 < q < {p:g}{root:?; δ_p is ¦}{root}"
     )
     INVARIANT_RAY = (
-        "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does, "
-        "and how often it passes a jump depends on the start; remove the jumps"
+        "failure: Λ({p:g}) is not known: the phase never leaves the ray at phi = {phase:.6g}, whatever the noise does. "
+        "The start decides how often the phase passes a jump; remove the jumps"
     )
     NEGATIVE_OF_SEVERAL = (
-        "failure: Λ(p) for p < 0 is not computed: the parts of the motion {parts} do not all drive each other, so that "
-        "it depends on how they grow together, not on each alone; choose p >= 0, or solve each part by itself"
+        "failure: Λ(p) for p < 0 is not computed: the parts of the motion {parts} do not all drive each other. Then "
+        "Λ(p) depends on how the parts grow together; choose p >= 0, or solve each part by itself"
     )
     NO_EIGENFUNCTION = (
-        "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at "
-        "phi = {phase:.6g}, whatever the noise does; for p > 0 Λ(p) is the larger of the growth rates on the ray and "
-        "across it"
+        "failure: there is no positive eigenfunction at p = {p:g}: the phase never leaves the ray at phi = "
+        "{phase:.6g}, whatever the noise does. For p > 0 Λ(p) is the larger growth rate, on the ray or across it"
     )
     NO_EIGENFUNCTION_OF_BLOCKS = (
         "failure: there is no positive eigenfunction at p = {p:g}: the blocks of variables {blocks} do not all drive "
-        "each other; for p > 0 Λ(p) is the largest of theirs"
+        "each other. For p > 0 Λ(p) is the largest Λ(p) of a block"
     )
     NO_COMMON_RATE = (
-        "failure: Λ″(0) does not exist: λ is {value:.6g} of two parts of the motion that do not mix, so that Λ″(p) "
-        "jumps at p = 0"
+        "failure: Λ″(0) does not exist: two parts of the motion do not mix, and both have λ = {value:.6g}. Λ″(p) jumps "
+        "at p = 0"
     )
     KINK = (
-        "failure: {p:?Λ({p:g})¦λ} has no derivatives: within the errors it is that of two parts of the motion that do "
-        "not mix, and either may be the larger one for other parameters"
+        "failure: {p:?Λ({p:g})¦λ} has no derivatives: two parts of the motion do not mix and share this value within "
+        "the errors. For other parameters either part may have the larger one"
     )
     CLOSES_BLOCKS = (
-        "note: no sensitivities to {key} at {value:g}: for any other value blocks of variables that are solved one by "
-        "one drive each other; choose a value close by"
+        "note: no sensitivities to {key} at {value:g}: fpsolve solves blocks of variables one by one there. For any "
+        "other value the blocks drive each other; choose a value close by"
     )
     START_MATTERS = (
-        "note: Λ(p) for p < -1 depends on the start: there is a set of phases around the slower mode into which the "
-        "noise never moves the phase; Λ(p) is given for starts in this set, and is smaller for other starts"
+        "note: Λ(p) for p < -1 depends on the start: the noise never moves the phase into a certain set around the "
+        "slower mode. Λ(p) holds for starts in this set, and is smaller for other starts"
     )
     INVARIANT_CLASSES = (
         "note: the phase never leaves the ray at phi = {phase:.6g}: λ is {along:.6g} on the ray and {across:.6g} "
-        "across it; Λ(p) is given for starts outside such rays"
+        "across it. Λ(p) holds for starts outside such rays"
     )
     BLOCKS = (
-        "note: the blocks of variables {blocks}{is_hidden:?, of coordinates y for which all matrices have blocks,¦} "
-        "are solved one by one, as none is driven by a later one: in this order their λ are {rates:.6g}; Λ(p) is given "
-        "for starts in none of them alone"
+        "note: fpsolve solves the blocks of variables {blocks} one by one{is_hidden:?, in coordinates y in which all "
+        "matrices have blocks}. No block drives an earlier one; in this order their λ are {rates:.6g}. Λ(p) holds for "
+        "starts that lie in no single block"
     )
     INFINITE_VARIANCE = (
         "failure: the noise has infinite variance, and its standard deviation is the unit of the mesh; choose r0 < 5/3"
     )
     NO_BOUND = (
-        "failure: got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails: Λ(p) is infinite for p > 0 "
-        "and p < -1, and no trial function is known to prove a bound of λ, or between; choose r0 <= 1, {remedy}"
+        "failure: got {key} = {value}; for r0 > 1 the noise of Eq. (7) has algebraic tails. Λ(p) is infinite for p > 0 "
+        "and p < -1; between, and for λ, no trial function is known to prove a bound. Choose r0 <= 1, {remedy}"
     )
 
     UNDERFLOW = "failure: P_s underflows in a cell of the noise; use a narrower interval"
     DEPENDENT = (
         "failure: elements of degree {degree} are linearly dependent up to rounding, as P_s falls too far within a "
-        "cell of the noise; use more or lower-degree cells, or a narrower interval"
+        "cell of the noise. Use more cells, cells of a lower degree, or a narrower interval"
     )
     NO_IMPACT_LINE = (
         "failure: {wanted} impact line(s) expected at phi = {place} + k pi, {found} found; put a line of the mesh at "
@@ -153,89 +152,93 @@ class Code(Enum):
     NOT_CONVERGED = "failure: Λ({p:g}) did not converge: {reason}"
     NOT_SOLVED = "failure: Λ({p:g}) cannot be solved ({reason})"
     OUT_OF_RANGE = "failure: Λ({p:g}) is beyond floating-point numbers ({reason})"
-    NEAR_ZERO = "failure: Λ(p) near p = 0 follows from Λ({p:g}): {reason}"
-    NOT_FINER = "failure: p = {p:g} did not converge on a finer mesh: {reason}"
+    NEAR_ZERO = "failure: Λ(p) near p = 0 follows from Λ({p:g}), and {reason}"
+    NOT_FINER = "failure: Λ({p:g}) was not found on a finer mesh: {reason}"
     NO_EIGENVALUE = (
         "failure: the principal eigenvalue at p = {p:g} was not found on this mesh: its backward error is "
-        "{residual:.1e} (at most {limit:g}), and {size:.1e} of T or T*, whichever is more positive, has the wrong sign "
-        "(at most {most:g})"
+        "{residual:.1e} (at most {limit:g}). Of T or T*, whichever is more positive, {size:.1e} has the wrong sign (at "
+        "most {most:g})"
     )
     LARGER_EIGENVALUE = (
         "failure: at p = {p:g} the eigenvalue {rightmost:.6g} lies to the right of {value:.6g}, although the "
         "eigenfunctions of {value:.6g} have one sign"
     )
     NO_ARNOLDI = "failure: the Arnoldi iteration for p = {p:g} did not converge"
-    UNKNOWNS_SPENT = "failure: the next mesh has {unknowns} unknowns, more than budget.unknowns = {most}"
+    UNKNOWNS_SPENT = (
+        "failure: it needs {unknowns:,} unknowns; the limit is {most:,} (try --set budget.unknowns={unknowns:more1.1})"
+    )
     SECONDS_SPENT = (
-        "failure: the numbers of this parameter set take some {seconds:.3g} s of processor time together, more than "
-        "budget.seconds = {most:g}"
+        "failure: this parameter set needs some {seconds:.3g} s of processor time; the limit is {most:g} s (try --set "
+        "budget.seconds={seconds:more2})"
     )
     NO_PAIR = "failure: there is no eigenfunction at p = {p:g} of this kind of problem"
-    MESHES_SPENT = "failure: {count} meshes were tried"
+    MESHES_SPENT = "failure: none of {count} meshes resolved it"
     ROUNDED = "failure: rounding alone may change it by {size:.1e}; use a larger rtol"
     NOTHING_RESOLVED = (
-        "failure: Λ({p:g}) did not converge: {reason}; no mesh resolved it{is_thin:?, as the layers of slow, strong "
-        "noise are too thin}{last:? ({last})}"
+        "failure: Λ({p:g}) was not found: {reason}{is_thin:?. The layers of slow, strong noise are too thin for all "
+        "meshes}{last:? ({last})}"
     )
     BUDGET_SPENT = (
-        "failure: Λ({p:g}) did not converge: {reason}; best value {value:.6g} with an estimated error of {error:.1e}, "
-        "{size:.1e} times the tolerance"
+        "failure: Λ({p:g}) was not found: {reason}. The best value {value:.6g} has an estimated error of {error:.1e}, "
+        "{size:.2g} times the tolerance"
     )
     MEANINGLESS = (
         "failure: {p:?Λ({p:g})¦{symbol}} = {value:.6g} has an estimated error of {size:.1g}, too much to mean anything"
     )
     NO_FUNCTION = (
-        "failure: there is no function Λ(p) from p = {low:g} to p = {high:g}, as no space serves all p, or moments are "
-        "carried at several places, or are of several blocks or of more than two variables, or two eigenvalues cross; "
-        "ask for single p"
+        "failure: there is no function Λ(p) from p = {low:g} to p = {high:g}; ask for single p. No space serves all p, "
+        "several places or blocks carry moments, two eigenvalues cross, or there are more than two variables"
     )
     NOT_CONVEX = (
         "failure: the computed Λ(p) is not convex between p = {p:g} and p = {other:g}, while the exponent is: a wrong "
         "eigenvalue was found"
     )
     NOT_PRINCIPAL = (
-        "failure: the eigenvalue {value:.10g} at p = {p:g} is not the principal one: by the equations of the moments "
-        "Λ({other:g}) is {expected:.10g}, and Λ is convex"
+        "failure: the eigenvalue {value:.10g} at p = {p:g} is not the principal one. Λ is convex, and the moment "
+        "equations give Λ({other:g}) = {expected:.10g}"
     )
     NOT_INCREASING = "failure: Λ(p)/p does not increase at p = {p:g}, while it must, as Λ is convex"
     NEGATIVE_DENSITY = "failure: the {name} at p = {p:g} is not resolved: {size:.0%} of it is negative"
     SIMULATION_OVERFLOWED = "failure: the simulation overflowed: some ξ is too large for this step; use a smaller step"
 
     RTOL_MISSED = (
-        "warning: rtol = {rtol:g} is not met at {count} of {of} moments, worst at p = {p:g} with an estimated relative "
-        "error of {size:.1e}; {remedy}, or use a larger rtol"
+        "warning: rtol = {rtol:g} is not met at {count} of {of} moments. The worst, p = {p:g}, has an estimated "
+        "relative error of {size:.1e}; {remedy}, or accept it by rtol = {size:more1.1}"
     )
     INDEX_RTOL_MISSED = (
-        "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}; "
-        "{remedy:?{remedy}, or use a larger rtol¦use a larger rtol to accept it, or a smaller one to refine its mesh}"
+        "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}. Accept it "
+        "by rtol = {size:more1.1}, or {remedy:?{remedy}¦use a smaller rtol for a finer mesh}"
     )
     CARRIED_ELSEWHERE = (
         "warning: Λ({p:g}) may be larger: slow noise may carry the moment near {z:.3g} standard deviations"
     )
     UNREADABLE = (
-        "warning: {name} at p = {p:g} is not resolved: {size:.0%} of it has the wrong sign; this hardly affects Λ, but "
+        "warning: {name} at p = {p:g} is not resolved: {size:.0%} of it has the wrong sign. This hardly affects Λ, but "
         "do not rely on a picture of it"
     )
     ROUGH_DENSITY = (
         "warning: the densities of directions at p = {p:g} are rough: {size:?finer functions move {size:.0%} of "
-        "them¦none of finer functions were compared}; this hardly affects Λ, but do not rely on their details"
+        "them¦fpsolve compared no finer functions}. This hardly affects Λ, but do not rely on their details"
     )
     FINE_DENSITY = (
         "warning: the densities of directions at p = {p:g} are finer than the nodes of their pictures, which miss "
-        "{size:.1%} of them; this hardly affects Λ, but do not rely on their heights"
+        "{size:.1%} of them. This hardly affects Λ, but do not rely on their heights"
     )
-    NOTHING_DRAWN = "warning: neither the stationary density nor eigenfunctions are written: {reason}"
+    NOTHING_DRAWN = (
+        "warning: fpsolve draws neither the stationary density nor eigenfunctions (λ and Λ(p) keep their stated "
+        "errors): {reason}"
+    )
 
-    INDEX_FAILED = "failure: no {symbols}: {reason}"
-    INDEX_MISSING = "warning: no {symbols}: {reason}"
-    INDEX_ABSENT = "note: no {symbols}: {reason}"
-    NO_MOMENT = "failure: there is no Λ({p:g})"
+    INDEX_FAILED = "failure: fpsolve found no {symbols}: {reason}"
+    INDEX_MISSING = "warning: fpsolve found no {symbols}: {reason}"
+    INDEX_ABSENT = "note: there is no {symbols}: {reason}"
+    NO_MOMENT = "failure: fpsolve found no Λ({p:g})"
     NOT_DRIVEN = "note: no noise moves the state, so that Λ(p) is λ p and has no other root"
     NO_ROOT = (
-        "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?, and may have none at all: with bounded "
-        "noise P(sup ‖x‖ > A) may fall faster than any power of A}"
+        "note: Λ(p) has no root p ≠ 0 in [{low:g}, {high:g}]{is_bounded:?. It may have none at all: with bounded noise "
+        "P(sup ‖x‖ > A) may fall faster than any power of A}"
     )
-    UNFINISHED = "failure: not everything is solved yet; the same command goes on"
+    UNFINISHED = "failure: not everything is solved yet; run the same command again to go on"
     LINEAR = "note: there is no δ_p, as Λ(p) is {value:.6g} p for all p, to its error"
     NO_ROOT_REACHED = "note: no δ_p was found in [{low:g}, {high:g}]; beyond, {reason}"
     EXCURSION_OPEN = (
@@ -243,24 +246,24 @@ class Code(Enum):
         "of P(sup ‖x‖ ≥ A)"
     )
     EXCURSION_BEYOND = (
-        "note: no δ_p was found up to p = {high:g}: E‖x‖^p decays for all of these p, so that P(sup ‖x‖ ≥ A) falls "
-        "faster than A^-{high:g}"
+        "note: no δ_p was found up to p = {high:g}: E‖x‖^p decays for all of these p. P(sup ‖x‖ ≥ A) falls faster than "
+        "A^-{high:g}"
     )
     EXCURSION_NO_INDEX = "note: there is no δ_p, and so no bound of P(sup ‖x‖ ≥ A): {reason}"
     EXCURSION_PLANE = (
         "note: P(sup ‖x‖ ≥ A) has bounds for two variables only, and here are {count}; δ_p is its exponent"
     )
     EXCURSION_RAY = (
-        "note: P(sup ‖x‖ ≥ A) has no bounds: the phase never leaves the ray at phi = {phase:.6g}, so that no "
-        "eigenfunction is positive everywhere; δ_p is the exponent for starts outside such rays"
+        "note: P(sup ‖x‖ ≥ A) has no bounds, as no eigenfunction is positive everywhere. The phase never leaves the "
+        "ray at phi = {phase:.6g}; δ_p is the exponent for starts outside such rays"
     )
     EXCURSION_UNBOUNDED = (
-        "note: the noise is unbounded, so that P(sup ‖x‖ ≥ A) has no bounds for every A: δ_p is its exponent, and the "
+        "note: as the noise is unbounded, no bounds of P(sup ‖x‖ ≥ A) hold for every A. Its exponent is δ_p, and the "
         "mean number of upcrossings bounds it for large A"
     )
     EXCURSION_NO_UPPER = (
-        "note: P(sup ‖x‖ ≥ A) has no upper bound: the least T is {value:.2g} with the error {error:.1g}, which may be "
-        "0; use a smaller rtol"
+        "note: P(sup ‖x‖ ≥ A) has no upper bound: the least T is {value:.2g} ± {error:.1g} and may be 0; use a smaller "
+        "rtol"
     )
     EXCURSION_UNRESOLVED = "failure: T at p = δ_p is not resolved, as no finer discretisation could be made"
     NOT_ONE_RAY = "note: the motion has impacts on {count:?{count}¦no} rays, and it is computed for one ray only"
@@ -273,8 +276,8 @@ class Code(Enum):
     ALWAYS_UNSTABLE = "note: unstable for every {symbol} in (0, 1]: λ = 0 would need {symbol} = {value:.3g}"
 
     NOISE_MISFIT = (
-        "warning: near {name} the density is {relative:+.1%} off that of the best fit, and the fit is made to "
-        "have it; elsewhere it is off; take another kind of noise, or more terms"
+        "warning: near {name} the given density is {relative:+.1%} off the best fit. So fpsolve fits it there, and "
+        "less well elsewhere; take another kind of noise, or more terms"
     )
     AS_READ = "note: {text}"
     FIT_STOPPED = (
@@ -282,35 +285,35 @@ class Code(Enum):
         "use fewer terms, or another kind"
     )
     NO_SPECTRUM_ERROR = (
-        "note: the errors of the measured values are not known, and are taken from how far each is from its "
-        "neighbours; state how many averages they are of"
+        "note: the errors of the measured values are not known. The scatter of neighbouring values gives them; state "
+        "how many averages they are of"
     )
     UNTOLD_PARAMETERS = (
-        "warning: the values do not tell all parameters of the fit, whose errors are then not known, though that of "
-        "the density is; use fewer terms, or another kind"
+        "warning: the values do not determine all parameters of the fit. The errors of the parameters are unknown, "
+        "that of the density is known; use fewer terms, or another kind"
     )
     SHORT_RECORD = (
         "warning: the record is {times:.3g} correlation times long, too few for its standard errors; use a record of "
         "at least {least:g}"
     )
     FAR_FROM_GAUSSIAN = (
-        "note: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}: its "
-        "variance is {reduced:.4g}, and that of the noise, Eq. (10), is {variance:.4g}"
+        "note: the Ornstein-Uhlenbeck reduction is meant for r0 near 1, but |r0 - 1| = {departure:.3g} > {most:g}. Its "
+        "variance is {reduced:.4g}, and Eq. (10) gives {variance:.4g} for the noise itself"
     )
     IMPOSSIBLE_BOUNCE = (
         "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} follows "
         "from the delta law only"
     )
     STRONG_NOISE = (
-        "note: perturbation theory, Eq. (37), is for weak noise{is_reduced:?, and here for the reduced noise}: do not "
-        "rely on it from |p| = {first:.3g} on, as Λ(p) differs from it by more than {most:.0%} of its terms; the "
-        "difference is largest at p = {p:.3g}, {rest:.3g}, which is {size:.0%}"
+        "note: perturbation theory, Eq. (37), is for weak noise{is_reduced:?, and here for the reduced noise}. Do not "
+        "rely on it from |p| = {first:.3g} on, where Λ(p) differs from it by more than {most:.0%} of its terms. The "
+        "largest difference is {rest:.3g}, {size:.0%} of them, at p = {p:.3g}"
     )
     LOAD_LEFT_OUT = (
         "note: no perturbation theory, Eq. (37), beside these numbers: it leaves out a harmonic load, as {keys} is"
     )
     NO_SENSITIVITIES = "note: no sensitivities of {p:?Λ({p:g})¦{symbol}}: {reason}"
-    UNUSED = "note: {keys}: in no rate and in no restitution, so that no result depends on it"
+    UNUSED = "note: {keys}: no rate and no restitution has it, so that no result depends on it"
     NO_DERIVATIVE = "note: no sensitivities to {key}: the derivative of the system by it is not finite at {value:g}"
     ONE_SIDED = (
         "note: the sensitivities to {key} = {value:g} are derivatives from below: above this value the noise has "
@@ -319,7 +322,7 @@ class Code(Enum):
 
     NO_PROBLEM = "failure: no such problem: {reason}"
     NOWHERE = "note: {symbol} exists nowhere in the frame"
-    UNSOLVED = "failure: {symbol} is found at no point of the frame: {reason}"
+    UNSOLVED = "failure: fpsolve found {symbol} at no point of the frame: {reason}"
     NO_LINE = "note: no line {line} was found, though {symbol} changes its sign in the frame"
     ONE_SIGN = "note: {side} {is_whole:?everywhere¦wherever it exists} in the frame"
     LINE_ENDS = "note: the line {line} ends inside of the frame: {reason}"
@@ -328,62 +331,62 @@ class Code(Enum):
     TOO_SHARP = "failure: the line turns too sharply, as it does where it meets another branch"
     TOO_LONG = "failure: the line has more than {count} points"
     ROW_SPENT = "failure: a row of the grid has used up its {most:.3g} s of processor time; use a larger {key}"
-    LINE_SPENT = "failure: budget.line_seconds = {most:g} of processor time are used up"
+    LINE_SPENT = "failure: the line has used up budget.line_seconds = {most:g} of processor time; use a larger one"
     DEAR_CHART = (
-        "note: {lines} is solved at {nodes} points of a grid, and at some {few} to {many} along each branch, seconds "
-        "each; what is solved is kept, and a smaller chart.nodes or a larger chart.step asks for less"
+        "note: fpsolve solves {lines} at {nodes} points of a grid, and at {few} to {many} along each branch, for "
+        "seconds each. It keeps all that is solved. A smaller chart.nodes or a larger chart.step asks for less"
     )
     LINE_STOPPED = "note: the line {line} is not traced to its end, and may have more branches: {reason}"
 
     UNREACHED = (
         "warning: {target} cannot be reached with {frame}: {side:?{side} everywhere¦{symbol} is from {least:.6g} to "
-        "{most:.6g}} there, and nearest at {place}; use a wider range, or other parameters"
+        "{most:.6g}} there. It comes nearest at {place}; use a wider range, or other parameters"
     )
     DESIGN_GAPS = (
         "failure: {target} was not found{count:?, and Λ could not be solved at {count} of the values tried}: {reason}"
     )
 
     FEW_PATHS = (
-        "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean, "
-        '{low:.0f}{high:? to {high:.0f}} where {needed} are needed; use {is_direct:?estimator = "population", or more '
-        "paths¦more paths}"
+        "warning: no estimate of Λ(p) at p = {p:g}: too few effective {is_direct:?windows¦paths} carry the mean. There "
+        'are {low:.0f}{high:? to {high:.0f}}, and {needed} are needed; use {is_direct:?estimator = "population", or '
+        "more paths¦more paths}"
     )
     TWO_PLACES = (
-        "warning: Λ({p:g}): the values of populations that start in two places of the noise differ by {gap:.3g}, which "
-        "is {size:.0f} standard errors: the noise is too slow to pass between the places; the larger value is given"
+        "warning: Λ({p:g}): populations that start in two places of the noise differ by {gap:.3g}, which is {size:.0f} "
+        "standard errors. The noise is too slow to pass between the places; the larger value is given"
     )
     DRIFTING = (
-        "warning: Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, which is more "
-        "than {most:g}, and its standard error does not include this; use {is_direct:?a longer window¦more time}"
+        "warning: Λ({p:g}) still drifts: over the simulation it changes by {size:.1f} standard errors, and {most:g} "
+        "are usual. Its standard error does not include this; use {is_direct:?a longer window¦more time}"
     )
     STOPPED = "warning: stopped early, after {share:.0%} of the time"
     AT_REST = (
         "warning: no stationary response: λ = {value:.3g} ± {error:.1e} {most:?is not {most:g} standard errors above "
-        "0¦is not positive}, and if λ < 0 almost every path comes to rest"
+        "0¦is not positive}. If λ < 0, almost every path comes to rest"
     )
     RESPONSE_LINEAR = (
-        "note: no stationary response: it is that of an oscillator with c2 or c3 > 0, or of equations with terms of "
-        "degree 3, or with a delay and a noise of degree 0; in other linear systems nothing limits the amplitude"
+        "note: no stationary response: in this linear system nothing limits the amplitude. A response needs an "
+        "oscillator with c2 or c3 > 0, terms of degree 3, or a delay and a noise of degree 0"
     )
     RESPONSE_GROWS = (
-        "note: no stationary response is computed: without noise the terms of degree 3 do not bring large amplitudes "
-        "down, or hardly; add damping of degree 3, or change their signs"
+        "note: no stationary response is computed: without noise the terms of degree 3 hardly limit large amplitudes, "
+        "if at all. Add damping of degree 3, or change its sign"
     )
     RESPONSE_RAYS = (
         "note: no stationary density by finite elements: the phase never leaves φ = {phase:.6g}, whatever the noise "
         "does; simulate the response instead"
     )
     RESPONSE_WALLS = (
-        "note: no stationary response is computed: it is for one wall at most, where a variable is 0 whose rate is c "
-        "times the other one, c > 0; leave out the others"
+        "note: no stationary response is computed for these walls. There may be one wall, where a variable is 0 whose "
+        "rate is c times the other one, c > 0; leave out the others"
     )
     RESPONSE_NOISE = (
-        "note: no stationary response is computed: it is for one noise with a density, and no white noise, impulses or "
-        "chains; take coloured noise with a short memory for white noise"
+        "note: no stationary response is computed for this noise. It must be one noise with a density: no white noise, "
+        "impulses or chains. For white noise take coloured noise with a short memory"
     )
     RESPONSE_TAILS = (
-        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails and δ_p, which tells "
-        "the density near rest, is not computed; use r0 <= 1, or simulate the response"
+        "note: no stationary density by finite elements: for r0 > 1 the noise has algebraic tails. Then δ_p, which "
+        "gives the density near rest, is not computed; use r0 <= 1, or simulate the response"
     )
     RESPONSE_DIES = (
         "note: no stationary response: λ = {value:.6g} ± {error:.1g} is not positive, so that almost every path comes "
@@ -397,8 +400,9 @@ class Code(Enum):
         "note: no stationary density by finite elements: there is no δ_p: {reason}; simulate the response instead"
     )
     RESPONSE_OPEN = (
-        "failure: the stationary response did not converge: its means still change by {size:.1e} of them{unknowns:?, "
-        "and the next discretisation has {unknowns} unknowns, more than {most}}; use an rtol of the response above that"
+        "failure: the stationary response did not converge: its means still change by {size:.1e} of them{unknowns:?. "
+        "The next discretisation needs {unknowns:,} unknowns; the limit is {most:,}}. Try --set "
+        "response.rtol={size:more1.1}"
     )
     RESPONSE_STOPPED = "warning: the simulation of the response was stopped early, after the time {time:.3g}"
     RESPONSE_NOT_REACHED = "warning: no stationary response: stopped before it was reached"
@@ -523,10 +527,21 @@ class _Writer(Formatter):
         if format_spec.startswith("?"):
             present, _, absent = format_spec[1:].partition("¦")
             return absent if value is None or value is False else present
+        if format_spec.startswith("more"):
+            return _more(value, float(format_spec[4:]))
         if type(value) is tuple:
             separator = "\n" if Message in map(type, value) else ", "
             return separator.join(self.format_field(each, format_spec) for each in value)
         return str(value) if type(value) is Message else "" if value is None else format(value, format_spec)
+
+
+def _more(value: float | None, factor: float) -> str:
+    """A number with two digits, larger by a factor or more: "120000" for 100548 and 1.1; "..." where there is none."""
+    if not value or not math.isfinite(value):
+        return "..."
+    step = 10.0 ** (math.floor(math.log10(factor * value)) - 1)
+    found = math.ceil(factor * value / step) * step
+    return f"{found:.0f}" if step >= 1 else f"{found:.2g}"
 
 
 def _python(value: Any) -> Any:

@@ -187,8 +187,8 @@ def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted
 def furstenberg_khasminskii(pair: PrincipalPair) -> float:
     """λ = ∫(ε q₁ξ + ε² q₂) ρ dφ dξ + ω ln R ∫[ρ(π/2, ξ) + ρ(3π/2, ξ)] dξ, with ρ from the pair at p = 0.
 
-    ω ρ, in other systems |dφ/dt| ρ, is the probability flux through an impact, where the log-amplitude jumps by ln R;
-    it is taken on the side from where the impact is met.
+    ω ρ, in other systems |dφ/dt| ρ, is the probability flux through an impact, on its side of approach. The
+    log-amplitude jumps by ln R there.
 
     Raises:
         ValueError: the pair is not the one at p = 0, several noises have values, or there are more than two variables.

@@ -71,7 +71,7 @@ class Design(Result):
         by: the ranges of the parameters.
         values: of the parameters by their keys; the error is by how much the nearest exact value may be off.
         found: the quantity there.
-        units: what a change of each parameter is measured by.
+        units: of the change of each parameter.
         solves: how many solves it took.
     """
 
@@ -114,7 +114,7 @@ def design(
 ) -> Design | Absent:
     """The values of parameters with which λ, Λ(p) or δ_p has a wanted value, or that it cannot be reached.
 
-    With several parameters it is the nearest point to the values of the problem: that with the least √(Σ xᵢ²), x the
+    With several parameters it is the nearest point: the least √(Σ xᵢ²), x the
     changes of the parameters in their units. Where several points serve it is one that the steps find from the
     values of the problem.
 
@@ -126,8 +126,8 @@ def design(
         target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".
         by: the parameters by their keys, each with its range as an `Axis`; of a key alone that is from half to twice
             its value.
-        units: what a change of a parameter is measured by, for some keys; if not stated, the absolute value of the
-            parameter, or where that is 0 the width of its range.
+        units: of changes of some parameters, by their keys; if omitted, the absolute value of the parameter, or for 0
+            the width of its range.
         budget: for a solve.
         progress: called after each solve.
 

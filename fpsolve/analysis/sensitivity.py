@@ -102,7 +102,7 @@ class Sensitivities(Result):
         return dataset("sensitivities", "finite elements", numbers, coordinates, self.theta, notes=self.notes)
 
     def shown(self) -> Mapping[str, tuple[float, Slopes]]:
-        """What pictures show: by their symbols λ, as p = 0, and Λ of some p, each with its derivatives."""
+        """By their symbols λ, as p = 0, and Λ of some p, each with its derivatives: the numbers of pictures."""
         rows = [(float(p), slopes) for p, slopes in zip(self.p, self.moments, strict=True) if p and slopes]
         chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
         exponent = self.indices.get(LYAPUNOV_EXPONENT.name)

@@ -230,8 +230,8 @@ def uncertainty(
 
     Args:
         problem: a motion and its noise.
-        uncertain: for the keys of parameters a share of the value, such as 0.05, or {"sd": 0.02}: the standard
-            deviation of a normal law, which is cut at the range of the parameter.
+        uncertain: the standard deviations of normal laws, cut at the ranges of the parameters, by their keys: a share
+            of the value, such as 0.05, or {"sd": 0.02}.
         p: one moment, or an array of shape (n,); none by default.
         rtol, budget: as for `moment_lyapunov`.
 

@@ -148,7 +148,7 @@ class Boundary(Result):
 
     @property
     def zero_field(self) -> ZeroField:
-        """F over the unit square, with the time that is left for the line."""
+        """F over the unit square, and the rest of the time for the line."""
         most = self.budget.line_seconds or math.inf
         return ZeroField(self, self.rtol, most - self.seconds, Message(Code.LINE_SPENT, most=most))
 
@@ -332,15 +332,15 @@ def boundary(
         problem: a motion and its noise, whose other parameters are held.
         target: such as "lyapunov_exponent = 0", "moment(2) = 0" or "stability_index = -1".
         x, y: the frame.
-        step: the longest step between two points, in sides of the frame; if omitted 0.02, or 0.05 where F takes
-            elements of three axes or more.
+        step: the longest step between two points, in sides of the frame; 0.02 if omitted, or 0.05 if F needs
+            elements of three axes.
         nodes: of the grid in which branches are looked for, each way; if omitted 13, or 7.
         budget: for a solve, and for the line: beyond its `line_seconds` what is traced is returned, with `obstacles`.
         progress: called once for each node of the grid, and once for each point of a branch.
 
     Raises:
-        ValueError: an axis is no parameter of the problem or out of its range, both are the same, or `target`, `step`
-            or `nodes` is none of these.
+        ValueError: an axis is no parameter of the problem or out of its range, or both are the same. Or `target`,
+            `step` or `nodes` is wrong.
     """
     check_axes(problem, x, y)
     if nodes is not None and not is_whole(nodes, 2):

@@ -156,7 +156,7 @@ class Curve:
 
 
 class Case(Section):
-    """What one case file says; made by `load_case`.
+    """The content of one case file; made by `load_case`.
 
     Raises:
         pydantic.ValidationError: with every fault of the sections and of what they say about each other.
@@ -218,7 +218,7 @@ class Case(Section):
 
     @cached_property
     def problem(self) -> Problem:
-        """What is solved where nothing is varied."""
+        """The problem without [vary]."""
         return Problem(self.system, self.noise)
 
     @property
@@ -227,7 +227,7 @@ class Case(Section):
         return self.problem.parameters
 
     def about(self, key: str) -> Quantity:
-        """What a parameter is, in the time unit of [units]."""
+        """The quantity of a parameter, in the time unit of [units]."""
         return self.parameters[key].quantity.timed(self.units.time)
 
     @property
@@ -241,11 +241,11 @@ class Case(Section):
 
     @property
     def overrides(self) -> tuple[str, ...]:
-        """What the command line has changed, as it was typed."""
+        """The changes of the command line, as typed."""
         return self._overrides
 
     def refusal(self, sentence: str, *path: str | int) -> CaseError:
-        """What is wrong with what stands at a path, told with its line."""
+        """The error of a key, with its line."""
         return CaseError(str(self.path), [self._document.fault(path, written_path(path), sentence)])
 
     @property
@@ -265,7 +265,7 @@ class Case(Section):
 
     @cached_property
     def method(self) -> Method:
-        """How Λ(p) of its first set is found."""
+        """The method for Λ(p) of its first set."""
         return choose(self.problem)
 
     @cached_property
@@ -298,7 +298,7 @@ class Case(Section):
 
     @property
     def unasked(self) -> tuple[str, ...]:
-        """What else there is of this case, where it leaves open what is computed."""
+        """Further quantities of this case, if it names none."""
         known = {*self.asked, DERIVATIVE.name, RESPONSE}
         known -= set() if self.output.asks_for_eigenfunctions else {EIGENFUNCTIONS}
         return tuple(each for each in self.available if self.output.names is None and each not in known)

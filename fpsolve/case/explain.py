@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from itertools import islice
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, islice
 from typing import Any, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, Discriminator, ValidationError, create_model
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
-from fpsolve.model.faults import TableError, fields_of, guess, nearest, sentence, written_path
+from fpsolve.model.faults import TableError, fields_of, guess, sentence, written_path
 from fpsolve.model.parameters import STRICT, Section, parameter
 
 MOST_FAULTS = 1000
@@ -60,9 +61,9 @@ def checked(fields: Fields, table: Mapping[str, object]) -> dict[str, Any]:
         raise
 
 
-def told(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[Refusal]:
-    """What pydantic found, in our words."""
-    return ((path, text) for path, _, text in explain(details, fields))
+def told(details: Iterable[ErrorDetails], fields: Fields, others: Sequence[Fields] = ()) -> Iterator[Refusal]:
+    """What pydantic found, in our words; `others` are those of tables of the same kind with other keys."""
+    return ((path, text) for path, _, text in explain(details, fields, others))
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -70,7 +71,9 @@ def is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and type(value) is not bool and abs(value) <= sys.float_info.max
 
 
-def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[Path, str, str]]:
+def explain(
+    details: Iterable[ErrorDetails], fields: Fields, others: Sequence[Fields] = ()
+) -> Iterator[tuple[Path, str, str]]:
     """Each fault that pydantic found: its path in the file, its key for the eye, and our sentence.
 
     What is missing where a key is misspelt is not another fault, nor is a list too short whose entries are wrong.
@@ -78,6 +81,7 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
     Args:
         details: with paths from a model.
         fields: of that model.
+        others: in place of these; what is missing beside an unknown key may then be stated by others.
     """
     faults = list[tuple[Path, ErrorDetails]]()
     for each in islice(details, MOST_FAULTS):
@@ -87,29 +91,37 @@ def explain(details: Iterable[ErrorDetails], fields: Fields) -> Iterator[tuple[P
             faults.append((tuple(part for part in (*each["loc"], *inside) if part not in _TAGS.values()), each))
     misspelt = set[Path]()
     for path, detail in faults:
-        if detail["type"] in _UNKNOWN and (known := guess(str(path[-1]), _known_keys(path, fields))):
+        if detail["type"] in _UNKNOWN and (known := _meant(str(path[-1]), _known_keys(path, fields, others))):
             misspelt.add((*path[:-1], *known.split(".")))
     for path, detail in faults:
         is_missing = detail["type"] == "missing" or detail["msg"].startswith("missing")
-        if not (is_missing and path in misspelt) and detail["msg"] != DEPENDENT:
-            yield path, written_path(path), _sentence(path, detail, fields)
+        if not (is_missing and (path in misspelt or (others and misspelt))) and detail["msg"] != DEPENDENT:
+            yield path, written_path(path), _sentence(path, detail, fields, others)
 
 
-def _known_keys(path: Path, fields: Fields) -> list[str]:
-    """The keys beside a path, and those of the tables among them."""
+def _known_keys(path: Path, fields: Fields, others: Sequence[Fields]) -> list[str]:
+    """The keys beside a path, those of the tables among them, and others in their place."""
     beside = _beside(path[:-1], fields)[0]
-    return [*beside, *(f"{name}.{key}" for name, field in beside.items() for key in fields_of(field.annotation))]
+    inner = (f"{name}.{key}" for name, field in beside.items() for key in fields_of(field.annotation))
+    return [*beside, *inner, *chain.from_iterable(others)]
 
 
-def _sentence(path: Path, detail: ErrorDetails, fields: Fields) -> str:
+def _meant(name: str, known: Sequence[str]) -> str | None:
+    """The known key that is most like a name, or that has its letters in their order, as in std."""
+    letters = ".*".join(map(re.escape, name))
+    return guess(name, known) or next((key for key in known if len(name) > 2 and re.match(letters, key)), None)
+
+
+def _sentence(path: Path, detail: ErrorDetails, fields: Fields, others: Sequence[Fields]) -> str:
     if detail["type"] == _OWN:
         return detail["msg"]
     if detail["type"] == "value_error":
         error = detail["ctx"]["error"]
         return error.text if isinstance(error, TableError) else str(error)
     if detail["type"] in _UNKNOWN:
-        beside = ", ".join(_beside(path[:-1], fields)[0])
-        hint = nearest(path[-1], _known_keys(path, fields))
+        beside = "; or ".join(", ".join(each) for each in (_beside(path[:-1], fields)[0], *others))
+        meant = _meant(str(path[-1]), _known_keys(path, fields, others))
+        hint = f' did you mean "{meant}"?' if meant else ""
         return f"unknown key;{hint} known keys: {beside}; rename or remove it"
     field = _beside(path, fields)[1]
     if type(path[-1]) is int:

@@ -21,7 +21,7 @@ from fpsolve.case.matrices import with_matrices
 from fpsolve.model.faults import TableError, fields_of, nearest, shown, table_of
 from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import Parametrised
+from fpsolve.model.parameters import Parametrised, Words
 from fpsolve.model.problem import Problem
 
 Half = Literal["system", "noise"]
@@ -80,21 +80,24 @@ def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
     kind, faults = _kind(half, table), list[ErrorDetails]()
     known = {**dict.fromkeys(table_of(table.get("parameters")), UNBOUNDED), **fields_of(kind)}
     given = {key: value for key, value in table.items() if key != "kind"}
+    named = {key: given.pop(key) for key in kind.naming if key in given}
     is_own = {key: key not in kind.stated and (key in known or kind.takes(key, table)) for key in given}
+    about = Words()
     try:
+        about = Words(**named)
         stated = validated(kind.stated, {key: value for key, value in given.items() if not is_own[key]})
     except ValidationError as error:
         faults, stated = error.errors(), {}
     if not (faults and any(field.is_required() for field in kind.stated.values())):
         try:
-            made = kind.from_table({key: value for key, value in given.items() if is_own[key]} | stated)
+            made = kind.from_table({key: value for key, value in given.items() if is_own[key]} | stated).called(about)
         except ValidationError as error:
             faults += error.errors()
         except (ValueError, TypeError) as error:
             if not faults:
                 path, text = (error.path, error.text) if isinstance(error, TableError) else ((), str(error))
                 refuse([(path, text)])
-    refuse(told(faults, known))
+    refuse(told(faults, known, [each.__pydantic_fields__ for each in kind.variants]))
     return made
 
 

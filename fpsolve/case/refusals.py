@@ -53,7 +53,7 @@ def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
     """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
     problem, moments = problem_of(valid), valid.get("moments")
     if len(vary) > MAX_CURVES:
-        yield (), f"makes {len(vary)} curves; must be at most {MAX_CURVES}; list fewer values"
+        yield (), f"makes {len(vary)} parameter sets; must be at most {MAX_CURVES}; list fewer values"
     elif problem and moments and (text := obstacle(problem, vary.sets[0], moments.values, with_moments=False)):
         yield ("file",) if vary.file else (), vary.line_of(1) + _with(vary.sets[0]) + text
 
@@ -100,8 +100,8 @@ def _of_figure(figure: FigureSection, valid: Known, context: Known) -> Iterator[
         return
     if figure.map and vary.crossing(figure.x) is None:
         text = (
-            'got true; a map needs a [vary] with mode = "product" of exactly two keys, each with two numbers or more, '
-            "and x to be one of them; vary two such keys, or remove it"
+            'got true; a map needs a [vary] with mode = "product" of two keys, each with several numbers, and x must '
+            "be one of them; vary two such keys, or remove it"
         )
         yield ("map",), text
     for name, key, limits in (("xlim", figure.x, figure.xlim), ("ylim", map_key(figure, vary), figure.ylim)):

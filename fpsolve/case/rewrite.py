@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 import tomlkit
+from tomlkit.items import Item, Table
 
 from fpsolve.case.case import Case
 from fpsolve.case.explain import is_number
@@ -76,13 +77,19 @@ def _with_data(text: str, data: Mapping[str, object]) -> str:
 
 
 def _update(table: MutableMapping[str, object], data: Mapping[str, object], before: Mapping[str, object]) -> None:
-    """Give a table the entries of data, as deep as both are tables; others stay as they are written."""
+    """Give a table the entries of data, as deep as both are tables; others stay as they are written.
+
+    A comment beside a value that changes says what the value was.
+    """
     for key in [key for key in before if key not in data]:
         del table[key]
     for key, value in data.items():
-        old = before.get(key)
-        inner = table.get(key)
+        old, inner, comment, was = before.get(key), table.get(key), "", ""
+        if isinstance(inner, Item) and not isinstance(inner, Table):
+            comment, was = inner.trivia.comment.lstrip("# "), inner.as_string()
         if isinstance(value, dict) and isinstance(old, dict) and isinstance(inner, MutableMapping):
             _update(inner, value, old)
         elif old != value or type(old) is not type(value):
             table[key] = value
+        if comment and old != value and isinstance(made := table[key], Item):
+            made.comment(f"before {was}: {comment}")

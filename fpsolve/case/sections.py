@@ -523,7 +523,7 @@ class ResponseSection(Section):
     """[response]: the stationary response to terms of degree 3, whose density is written, or of degree 0."""
 
     rtol: Annotated[float, parameter("wanted relative error of its means", "rtol = 1e-6", ge=1e-10, le=0.1)] = 1e-6
-    off: Annotated[bool, parameter("whether it is left out", "off = true")] = False
+    off: Annotated[bool, parameter("true computes no response", "off = true")] = False
     grid: Annotated[
         ResponseGrid, parameter("places of the written density", "grid = { amplitude = 80, phi = 49, xi = 25 }")
     ] = ResponseGrid()
@@ -546,7 +546,7 @@ class Expectation(Section):
             lambda table: flat(table) if isinstance(table, dict) else table,
             json_schema_input_type=dict[str, Value | dict[str, Value]],
         ),
-        parameter("which curves: some of the varied keys", 'where = { "noise.D0" = 1.0 }'),
+        parameter("which parameter sets, by values of varied keys", 'where = { "noise.D0" = 1.0 }'),
     ] = Field(default_factory=dict)
 
     @property

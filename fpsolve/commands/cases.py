@@ -205,7 +205,7 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What was done with a case.
+    """The results of a case.
 
     Attributes:
         sweep: its sets, solved.
@@ -225,11 +225,10 @@ def run(
     fresh: bool = False,
     progress: Callable[[], None] = lambda: None,
 ) -> tuple[CurveResult, ...]:
-    """Solve a case, write `out`/<name of the case>/, and return the results, one for each curve.
+    """Solve a case, write `out`/<name of the case>/, and return a result for each parameter set.
 
-    Sets that an earlier run finished there, also one that was killed, are not solved again. Each run rewrites all
-    files, and removes what a simulation of other parameters wrote. `complete` in
-    results.nc says whether all curves are there.
+    A run does not repeat sets that an earlier run finished there. Each run rewrites all files, and removes those of a
+    simulation of other parameters. `complete` in results.nc says whether all sets are there.
 
     >>> run("minimal.toml")  # a case of `fpsolve new minimal`
     (CurveResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
@@ -240,13 +239,13 @@ def run(
         jobs: how many processes solve; None for one on each processor.
         scheduler: the address of a Dask scheduler whose workers solve instead, such as "tcp://host:8786".
         fresh: whether to solve all sets again.
-        progress: called once for each curve that is done, or for each p of a case with a single curve.
+        progress: called once for each set, or for each p of a single set.
 
     Raises:
         TypeError: an argument is of another type.
         CaseError: with every fault of the file; nothing is solved.
         OutputError: the folder cannot be made or written to, or another run writes into it; nothing is solved.
-        NotConverged: some p or indices failed; everything else is written, and `partial` holds it.
+        NotConverged: some p or summary numbers failed; everything else is written, and `partial` holds it.
     """
     require(case, Case | str | Path, "case", "a case, or the path of its file")
     require(out, str | Path, "out", "the path of a folder")

@@ -56,8 +56,8 @@ def chart_case(
 ) -> Chart:
     """Trace the lines of the chart of a case, and write chart.csv, .json, .png and .pdf into `out`/<name of the case>/.
 
-    The tables are written again after every branch. What an earlier chart wrote there is removed first, and what was
-    solved or simulated with other parameters; but lines that it has finished are not traced again.
+    It writes the tables again after every branch. It first removes the files of an earlier chart and those of other
+    parameters, but does not repeat finished lines.
 
     Args:
         pool: who scans the plane.
@@ -158,8 +158,10 @@ def chart(
 ) -> int:
     """Trace where stability ends in a plane of two parameters; write chart.csv, .json, .png and .pdf into OUT/<case>/.
 
-    [budget] line_seconds limits a line: what is traced by then is kept, and the exit code is 3.
-    [budget] seconds limits a row of points of the grid; a point may take half of the time that is left for its row.
+    [budget] line_seconds limits a line: the command keeps its points up to
+    then, and the exit code is 3.
+    [budget] seconds limits a row of points of the grid; a point may take half
+    of the rest of its row.
     Both limits are processor time.
 
     Example: fpsolve chart cases/chart.toml --set chart.x.stop=3.0

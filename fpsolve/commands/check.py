@@ -74,8 +74,8 @@ def check(
     hierarchy: Annotated[
         bool,
         Parameter(
-            help="Compare Λ of the even p of [moments] with the moment hierarchy instead, the equations of moments; "
-            "without walls, under all noise but that with algebraic tails."
+            help="Compare Λ at the even p of [moments] with the moment equations instead. The system must have no "
+            "wall, and its noise no algebraic tails."
         ),
     ] = False,
     options: Options = OPTIONS,

@@ -77,8 +77,8 @@ def design(
     by: Annotated[
         list[str] | None,
         Parameter(
-            help="A parameter that may change, such as oscillator.c1. With several the nearest point is found: that "
-            "with the smallest relative changes."
+            help="A parameter that may change, such as oscillator.c1. With several, fpsolve finds the point with the "
+            "smallest relative changes."
         ),
     ] = None,
     start: Annotated[list[float] | None, Parameter(name="--from")] = None,
@@ -91,14 +91,14 @@ def design(
 
     Write design.toml, the case with these values, and design.json into OUT/<case>/.
 
-    Exit codes: 0 found, 1 it cannot be reached in the range, 2 bad input, 3 not converged.
+    Exit codes: 0 found, 1 not within reach in the range, 2 bad input, 3 not converged.
 
     Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
 
     Args:
         target: What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'.
-        start: Its smallest value, one for each --by; half of its value if omitted.
-        stop: Its largest value, one for each --by; twice its value if omitted.
+        start: Smallest value of each --by; if omitted, half of its value.
+        stop: Largest value of each --by; if omitted, twice its value.
         json: Print design.json, one line for each case.
     """
 

@@ -1,4 +1,4 @@
-"""Fit a noise to what was measured; say what it means for stability."""
+"""Fit a noise to a measurement; print what it means for stability."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Statement:
         per: The unit of the frequencies; if omitted that of the file, which must state it.
         sided: Whether the integral over f > 0 is the variance, one, or half of it, two.
         frequency: Natural frequency in the unit of --per, Hz if that is omitted; of two modes twice.
-        damping_ratio: Damping as a share of critical damping: states an oscillator, whose verdict is told.
+        damping_ratio: Damping as a share of critical damping; it states an oscillator, to give λ and Λ(2).
         restitution: Speed after a bounce off its wall over that before; no wall if omitted.
         case: A case instead, whose noise is replaced.
         noise_in: Where the noise is; stiffness if neither this nor --of is stated.
@@ -61,18 +61,18 @@ class Statement:
         terms: How many noises of the kind are added, 1 or 2.
         column: The column of values, if the file has several.
         rate: Values of the record per second, in place of the times of the file.
-        over: The column of frequencies or times, if its name does not tell.
+        over: The column of frequencies or times, if its name does not say so.
         unit: The unit of the signal, such as g, or of its density, in place of that of the file.
         time_unit: The unit of the times of a record, such as ms, in place of that of the file.
-        scale: What the signal is multiplied by; a density by its square.
-        skip: Rows of the file that are left out at its beginning; of a text lines.
+        scale: Factor of the signal; a density has its square.
+        skip: Rows at the beginning of the file to leave out; lines of a text.
         names: Names of the columns of a text with their units, such as "t (s),a (g)", in place of its own.
         by: How the values of a record follow each other in a text.
         parameters: Those of the named density, such as Hs=2,Tp=9.
         segment: Seconds of a segment of a record; as the natural frequency needs if omitted.
         rtol: Tolerance of the exponents of the system, relative; 1e-4 if omitted.
         seconds: Processor time for each exponent of the system; 20 if omitted.
-        averages: How many independent periodograms the spectrum is the mean of: tells its errors.
+        averages: Number of independent periodograms of which the spectrum is the mean; it gives the errors.
     """
 
     record: Path | None = None
@@ -86,8 +86,8 @@ class Statement:
     of: Annotated[
         Literal["stiffness", "damping", "acceleration", "height"] | None,
         Parameter(
-            help="What was measured: the relative stiffness, the damping in 1/s, the vertical acceleration of the "
-            "support of a pendulum in m/s^2, or the metacentric height of a ship in m; that of --noise-in if omitted."
+            help="The signal: relative stiffness, damping in 1/s, vertical acceleration of a pendulum's support in "
+            "m/s^2, or metacentric height of a ship in m. If omitted, that of --noise-in."
         ),
     ] = None
     length: float | None = None
@@ -235,10 +235,11 @@ def noise(
     out: Path = Path("results"),
     json: bool = False,
 ) -> int:
-    """Fit a noise to what was measured, most of all at twice the natural frequency; say what it means for stability.
+    """Fit a noise to a measurement, closest at twice the natural frequency; print what it means for stability.
 
-    Prints the section [noise] of a case, and writes noise.toml, a case with it, noise.json and a figure into
-    OUT/<file>/. Frequencies of the fit are 2f, of two modes 2f1, 2f2, f1 + f2 and |f1 - f2|, and 0 for noise in the
+    Print the section [noise] of a case; write noise.toml, a case with it,
+    noise.json and a figure into OUT/<file>/. Frequencies of the fit are 2f,
+    of two modes 2f1, 2f2, f1 + f2 and |f1 - f2|, and 0 for noise in the
     damping.
 
     Example: fpsolve noise spectrum.csv --per Hz --sided one --frequency 2.0 --damping-ratio 0.01 --averages 64

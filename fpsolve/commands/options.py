@@ -48,13 +48,13 @@ SET = (
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Options:
-    """What all commands on cases take."""
+    """Options of all commands on cases."""
 
     quiet: Annotated[
         bool,
         Parameter(
-            help='Print only the last line, and on the standard error only errors and what is "not converged". Tables, '
-            "notes and warnings are in the files."
+            help='Print only the last line, and on the standard error only errors and "not converged". Tables, notes '
+            "and warnings are in the files."
         ),
     ] = False
     overrides: Annotated[list[str] | None, Parameter(name="--set", help=SET)] = None
@@ -82,7 +82,7 @@ class Options:
         return cases
 
     def watch(self, *, is_json: bool = False) -> Watch:
-        """What is printed on the way: progress and results, with JSON no tables, or only what failed."""
+        """Prints progress and results, with JSON no tables, or only failures."""
         if self.quiet:
             return Watch(noted=partial(print_blocks, severities=[Severity.FAILURE]), said=print_blocks)
         watch = Watch(Bars().bar, noted=print_blocks, said=print_blocks)
@@ -119,7 +119,7 @@ OPTIONS, WORKERS = Options(), Workers()
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Flags:
-    """What commands take that work on cases, write files, and report.
+    """Options of commands that write files and reports.
 
     Attributes:
         out: Folder for the results.
@@ -221,5 +221,5 @@ def kept(done: int, of: str, folder: Path | None = None, *, is_more: bool = Fals
 
 
 def of_curves(case: Case) -> str:
-    """What is counted of a case: "of 3 curves"."""
-    return f"of {case.planned} curve{'s' if case.planned > 1 else ''}"
+    """What is counted of a case: "of 3 parameter sets"."""
+    return f"of {case.planned} parameter set{'s' if case.planned > 1 else ''}"

@@ -1,4 +1,4 @@
-"""Prove bounds on the exponents that hold with certainty."""
+"""Prove rigorous bounds on the exponents."""
 
 from __future__ import annotations
 
@@ -134,10 +134,10 @@ def prove(
     check: Path | None = None,
     flags: Flags = FLAGS,
 ) -> int:
-    """Prove bounds on the exponents that hold with certainty; write them with certificates into OUT/<case>/proof.json.
+    """Prove rigorous bounds on the exponents; write them with certificates into OUT/<case>/proof.json.
 
-    A bound takes at most half of [budget] seconds of processor time and a third more.
-    The bounds on δ_p together take at most twice as much.
+    A bound takes at most two thirds of [budget] seconds of processor time;
+    the bounds on δ_p together twice that.
     Needs python-flint: pip install 'fpsolve[proof]'.
 
     Exit codes: 0 proven, 3 bounds are farther apart than wanted; with --check 0 accepted, 1 rejected, 2 malformed.
@@ -145,7 +145,7 @@ def prove(
     Example: fpsolve prove cases/fig1.toml --width 1e-9
 
     Args:
-        width: Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of each number.
+        width: Wanted distance of the bounds, in 1/time; if omitted, 1e-7 of the scale of a number.
         check: Prove nothing, but verify a proof.json from its certificates alone.
     """
 
@@ -153,7 +153,7 @@ def prove(
         raise FpsolveError("name either cases to prove, or with --check a proof.json to verify")
     if check is not None:
         if width is not None or flags != Flags(Options(flags.options.quiet)):
-            raise FpsolveError("--check takes a proof.json and nothing else, as that says all that is verified")
+            raise FpsolveError("--check takes a proof.json and no other option")
         return verify(check)
 
     def work(case: Case, pool: Pool) -> Done:
@@ -178,7 +178,7 @@ def verify(path: Path) -> int:
         objections = f"{len(checked.objections)} objection{'s' * (len(checked.objections) > 1)}"
         print(f"rejected: {escaped(str(path))} ({objections}, {bounds})")
         return CHECK_FAILED
-    unfinished = "" if checked.claims.complete else "; what proved them was interrupted"
+    unfinished = "" if checked.claims.complete else "; the run that proved them was interrupted"
     print(f"accepted: {escaped(str(path))} ({bounds} follow from their certificates{unfinished})")
-    print("note: parameters are labels; the bounds are of the matrices and rates that the certificates state")
+    print("note: the parameters are labels; the bounds hold for the matrices and rates in the certificates")
     return 0

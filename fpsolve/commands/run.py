@@ -30,12 +30,16 @@ def run(
 ) -> int:
     """Solve case files; write tables, figures and ParaView files into OUT/<case>/.
 
-    Curves that an earlier run has finished are not solved again, even if that run was killed.
+    A run does not repeat parameter sets that an earlier run has finished, even if that run was killed.
 
-    Without [output] quantities a case computes moment, lyapunov_exponent, stability_index, of walls impact_rate and
-    critical_impact_factor, of terms of degree 3 the response, one of the eigenfunctions, and what other sections name.
-    Only where they are named, or with --all, it computes variance_rate, critical_restitution, sensitivities, all
-    eigenfunctions with densities, rate_function, excursions, and moment_derivative where it takes long, too.
+    Without [output] quantities a case computes moment, lyapunov_exponent,
+    stability_index and one eigenfunction.
+    A wall adds impact_rate and critical_impact_factor; terms of degree 3 add
+    the response.
+    Other quantities need their names in [output] quantities or a section, or
+    --all: variance_rate, critical_restitution, sensitivities, all
+    eigenfunctions with densities, rate_function, excursions, and a
+    moment_derivative that takes long.
 
     Example: fpsolve run cases/fig1.toml --out results --set oscillator.omega=2.0
 
@@ -43,7 +47,7 @@ def run(
         monte_carlo: Also simulate, as [monte_carlo] of the case says, and draw both.
         json: Print the summaries, one line of JSON for each case, instead of tables.
         everything: Compute everything, as quantities = "all" in [output].
-        table: Print every number of up to ten curves, also Λ(p) at more than 12 p.
+        table: Print every number of up to ten parameter sets, also Λ(p) at more than 12 p.
     """
 
     def work(case: Case, pool: Pool) -> Done:
@@ -51,7 +55,8 @@ def run(
         outcome = run_case(case, flags.out, pool=pool, watch=watch, monte_carlo=monte_carlo, is_fresh=fresh)
         sweep, interruption = outcome.sweep, outcome.simulations.interruption
         if not (flags.options.quiet or interruption):
-            print_blocks(left_out(case, monte_carlo=monte_carlo))
+            is_first = case.path == cases[0] and not sweep.known
+            print_blocks(left_out(case, monte_carlo=monte_carlo, is_first=is_first))
         if json:
             print(summary_line(sweep.results, sweep.facts))
         what = "" if json else done_of(case, len(sweep.results), sweep.failed)

@@ -105,7 +105,7 @@ class Simulations:
                 if len(self.simulated) in (0, case.planned):  # nothing is found, or all, but not written
                     raise
         if self.whole < case.planned:
-            place = f"in the simulation of curve {self.whole + 1} of {case.planned}"
+            place = f"in the simulation of parameter set {self.whole + 1} of {case.planned}"
             self.interruption = f"interrupted {place}; what was done is kept in {folder}; {AGAIN}"
         watch.shown(show(case, self.simulated, results))
         watch.noted(notes(case, self.simulated, MONTE_CARLO))
@@ -121,9 +121,9 @@ def simulate_case(
 ) -> Simulations:
     """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
 
-    Of a system with terms of degree 3 the stationary response is written too. What an earlier simulation wrote there is
-    removed first, and a run with other parameters. An interrupt (Ctrl-C) ends the simulation; what is done is estimated
-    and written, and curves that are finished are not simulated again the next time.
+    A system with terms of degree 3 adds the stationary response. The files of an earlier simulation, and of a run with
+    other parameters, are removed first. An interrupt (Ctrl-C) ends the simulation, and writes its estimates so far. The
+    next simulation does not repeat finished sets.
 
     Args:
         pool: whose other machines simulate, such as a `cluster`; all processors of this one where there are none.
@@ -162,7 +162,7 @@ def simulate(
     """Simulate the system with its impacts and estimate the exponents; write monte_carlo.json into OUT/<case>/.
 
     Ctrl-C ends the simulation early and keeps what is done.
-    Curves that an earlier simulation has finished are not simulated again.
+    It does not repeat parameter sets that an earlier simulation finished.
 
     Example: fpsolve simulate cases/fig1.toml --paths 100000 --seed 1 --estimator population
 

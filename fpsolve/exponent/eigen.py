@@ -260,8 +260,8 @@ def _tangent(pair: PrincipalPair, others: Sequence[PrincipalPair]) -> float:
 def spectrum(generator: Generator, p: float, k: int = 10) -> Any:
     """The k rightmost eigenvalues of L(p), by decreasing real part: complex, shape (k,).
 
-    All eigenvalues of the dense matrix are computed (QR algorithm), so that none can be missed; use a
-    full-circle mesh for the whole spectrum, a half-circle one has the π-periodic part of it only.
+    The QR algorithm gives all eigenvalues of the dense matrix. Use a full-circle mesh for the whole spectrum; a
+    half-circle mesh has its π-periodic part only.
 
     Raises:
         ValueError: k is not from 1 to the number of unknowns, or these exceed `MAX_SPECTRUM_UNKNOWNS`.

@@ -63,8 +63,8 @@ class MomentLyapunovFunction(Result):
     Raises:
         ValueError: the interval is empty or not finite.
         NoSuchExponent: Λ(p) is infinite in the interval.
-        NotConverged: some p are not resolved on the mesh, or within the budget; or there is no such function, as of
-            several blocks, or of more variables.
+        NotConverged: some p are not resolved on the mesh, or within the budget. Or there is no such function, as for
+            several blocks or more variables.
     """
 
     def __init__(

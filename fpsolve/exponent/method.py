@@ -61,14 +61,14 @@ Along = Mapping[str, ParameterDerivative]
 
 @strict_dataclass
 class Budget:
-    """What the numbers of a parameter set may cost, and a line of a chart.
+    """The limits of cost of the numbers of a parameter set, and of a line of a chart.
 
     No number depends on the seconds. With few unknowns a number may be less accurate than with more, within its error.
 
     Args:
         unknowns: of the largest system; None for as many as 1.5 GB hold, see `Space.most_unknowns`.
         seconds: of a processor for all numbers of a parameter set together, asked before each factorisation. The nodes
-            of a row of a scan share it, and each may take half of what is left.
+            of a row of a scan share it; each may take half of the rest.
         line_seconds: of a processor for a line of a chart, its scan, which may take half of them, and its branches;
             None for any time.
 
@@ -138,7 +138,7 @@ DIRECTIONS: Pictures = Pictures("directions", 3, is_seen=False)  # which take se
 
 
 class Method:
-    """How Λ(p) of one kind of problem is found.
+    """The method for Λ(p) of one kind of problem.
 
     A kind of one's own is a class with `takes`, `solution` and, for charts and designs, `gradient`. It stands before
     the others in `kinds.METHODS`.
@@ -253,7 +253,7 @@ class Method:
 
     @property
     def refinement(self) -> Remedy:
-        """What to do where it should be resolved better."""
+        """The remedy for a poor resolution."""
         return Remedy.SMALLER_RTOL if self.adapts else Remedy.MESH
 
     @contextmanager

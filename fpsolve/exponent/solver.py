@@ -58,10 +58,10 @@ class MomentLyapunov(Result):
     Attributes:
         p: the moments, shape (n,), in the order asked for, without those that failed.
         value: Λ(p), per unit time, shape (n,).
-        slope: Λ′(p), shape (n,), where it takes no solve of its own, NaN elsewhere: at even p where moments have
-            equations of their own, and at p = 0 where algebraic tails leave it no slope.
-        error_estimate: estimate of |error of `value`|, from the highest modes, the ends of a noise interval and the
-            bound of rounding, at least half a unit in the last place of the value, shape (n,).
+        slope: Λ′(p), shape (n,). It is NaN at even p where moments have equations of their own, and at p = 0 under
+            algebraic tails.
+        error_estimate: estimate of |error of `value`|, shape (n,), from the highest modes, the ends of a noise interval
+            and the bound of rounding. It is at least half a unit in the last place.
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         curves: of which these are values; none where each p was solved.
@@ -206,7 +206,7 @@ class ExponentSolver:
 
     @cached_property
     def method(self) -> Method:
-        """How Λ(p) of such a problem is found."""
+        """The method for Λ(p) of such a problem."""
         settings = Settings(self.rtol, self.of_value, self.mesh, self.budget, self.meter)
         return choose(self.problem, settings)
 
@@ -367,8 +367,8 @@ def moment_lyapunov(
     Args:
         problem: a motion and its noise.
         p: one moment, or an array of shape (n,).
-        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8, under two noises
-            that are not white 1e-6, for more than two variables 1e-5, and 1e-3 where one of these has a wall.
+        rtol: |error| ≤ rtol·max(|Λ|, the terms of Eq. (37) before they cancel); None is 1e-8. Under two noises
+            that are not white it is 1e-6, for more than two variables 1e-5, with a wall of these 1e-3.
         mesh: a mesh for all p, where an `error_estimate` above rtol gives a warning; None chooses one that meets rtol.
         budget: what the choice of a mesh may cost; None for the default one.
 

@@ -150,9 +150,9 @@ def make_mesh(
 def write_mesh(mesh: CylinderMesh, path: str | Path, impact: float = math.pi / 2) -> None:
     """Write quadrilaterals with points (φ, z, 0) to a .vtu or, for Gmsh, a .msh file, by its ending.
 
-    Line cells mark the impacts, at φ = `impact` mod π, the seam and the truncations (a seam at an impact has both), by
-    the cell data `marker` in a .vtu, see `MARKERS`, and by named physical groups in a .msh. The point data `phi_degree`
-    and `xi_degree` hold the degrees.
+    Line cells mark the impacts, at φ = `impact` mod π, the seam and the truncations; a seam at an impact has both. The
+    marks are the cell data `marker` in a .vtu, see `MARKERS`, and named physical groups in a .msh. The point data
+    `phi_degree` and `xi_degree` hold the degrees.
 
     Raises:
         MeshError: an unknown ending, or a folder that cannot be written to.

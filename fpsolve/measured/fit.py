@@ -222,11 +222,11 @@ def fit_noise(
         kind: "ornstein-uhlenbeck", "filter", which chooses ξ = y, y′ or y + c₁y′, or "bounded".
         frequency: natural frequency ω, in rad/time.
         second_frequency: of a second mode, in rad/time.
-        noise_in: "stiffness", for which S(2ω) counts, or "damping", for which S(0) counts as well; of two modes
-            S(2ω₁), S(2ω₂), S(ω₁ ± ω₂).
+        noise_in: "stiffness", where S(2ω) counts, or "damping", where S(0) counts as well. Of two modes S(2ω₁), S(2ω₂)
+            and S(ω₁ ± ω₂) count.
         terms: 1 or 2, how many independent noises of the kind ξ is the sum of.
-        segment: of a record the time of a segment; None for the shortest that resolves the frequencies, or a
-            thirty-second of the record if that is longer.
+        segment: time of a segment of a record. None is the shortest that resolves the frequencies, or 1/32 of the
+            record if longer.
 
     Raises:
         ValueError: an argument is none of these, or nothing was measured near a frequency that matters.

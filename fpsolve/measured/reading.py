@@ -54,7 +54,7 @@ def read_spectrum(
         over: the name of the column of frequencies, if neither its name nor its unit tells it.
         unit: of the density, such as "g^2/Hz", or of its root, such as "g/sqrt(Hz)"; in place of that of the file.
         scale: what the signal is multiplied by, the density by its square.
-        skip: rows of the file at its beginning that are left out, of a text its lines.
+        skip: rows at the beginning of the file to leave out; lines of a text.
         names: of the columns of a text, with their units, such as "f (Hz),G (1/Hz)", in place of those that it has.
         averages: see `Spectrum.from_columns`.
 
@@ -90,7 +90,9 @@ def read_spectrum(
         order = np.argsort(f, kind="stable") if np.all(np.diff(f) < 0) else slice(None)
         f, values = f[order], values[order]
         left_out = (values == 0) & (f > 0) | np.r_[False, (np.diff(f) == 0) & (np.diff(values) == 0)]
-        notes = (f"{np.sum(left_out)} rows are left out, whose density is 0 or which stand twice",) * any(left_out)
+        notes = (f"{np.sum(left_out)} rows count for nothing, as their density is 0 or they stand twice",) * any(
+            left_out
+        )
         f, values = f[~left_out], values[~left_out]
         made = Spectrum.from_columns(f, values, "Hz" if pers == {"Hz"} else "rad/s", sided, averages)
         read = f"column {name} in {unit}, {sided}-sided, {f.size} frequencies"

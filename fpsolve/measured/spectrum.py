@@ -115,7 +115,7 @@ class Spectrum:
 
         Args:
             f: frequencies, ≥ 0, in the unit `per`, shape (n,).
-            G: the density, in ξ²/Hz or ξ²/(rad/s), shape (n,). A value at f = 0 is left out, which is the mean's.
+            G: the density, in ξ²/Hz or ξ²/(rad/s), shape (n,). A value at f = 0, of the mean, does not count.
             per: "Hz" or "rad/s".
             sided: "one" or "two".
             averages: how many independent periodograms each value is the mean of: its relative standard error is one

@@ -29,7 +29,7 @@ STAMPS: Sequence[Stamps] = (pd.to_timedelta, partial(_calendar, format="ISO8601"
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What a file holds.
+    """The content of a file.
 
     Attributes:
         columns: by their names, in the order of the file.

@@ -171,7 +171,7 @@ def fields_of(annotation: object) -> Mapping[str, FieldInfo]:
     if not isinstance(annotation, type):
         return {}
     if issubclass(annotation, Parametrised):
-        return {**annotation.__pydantic_fields__, **annotation.stated}
+        return {**annotation.__pydantic_fields__, **annotation.stated, **annotation.naming}
     if issubclass(annotation, BaseModel) or is_pydantic_dataclass(annotation):
         return annotation.__pydantic_fields__
     return {}

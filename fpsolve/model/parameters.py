@@ -9,12 +9,14 @@ from dataclasses import replace
 from enum import Enum
 from typing import Annotated, Any, ClassVar, NamedTuple, Self, cast
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from fpsolve.arrays import shown
 from fpsolve.data import plain_unit
-from fpsolve.messages import Message
+from fpsolve.drawing import is_math
+from fpsolve.messages import Message, is_control
 from fpsolve.model.quantity import Quantity
 
 SIZE = {"ge": 1e-15, "le": 1e15}
@@ -81,19 +83,9 @@ def example_of(field: FieldInfo) -> str:
     return str((field.examples or [""])[0])
 
 
-def symbol_of(field: FieldInfo) -> str:
-    """The symbol of a `parameter` in LaTeX, or nothing."""
-    return _extra(field).get("symbol", "")
-
-
-def unit_of(field: FieldInfo) -> str:
-    """The unit of a `parameter`, or nothing."""
-    return _extra(field).get("unit", "")
-
-
 def meaning_of(field: FieldInfo) -> str:
     """What a `parameter` is, with its unit."""
-    unit, meaning = unit_of(field), field.description or ""
+    unit, meaning = _extra(field).get("unit"), field.description or ""
     return f"{meaning}, in {plain_unit(unit)}" if unit else meaning
 
 
@@ -119,6 +111,37 @@ def stated_field(annotation: Any, meaning: str, example: str, default: Any = Pyd
     return FieldInfo.from_annotated_attribute(annotated, default)
 
 
+def _printed(text: str) -> str:
+    if any(map(is_control, text)):
+        raise ValueError(f"got {shown(text)}; must have no control characters; leave them out")
+    return text
+
+
+def _symbol(text: str) -> str:
+    symbol = _printed(text).strip(" $")
+    if not is_math(f"${symbol}$"):
+        raise ValueError(f"got {shown(text)}; must be a symbol that matplotlib can draw; write, for example, \\\\zeta")
+    return symbol
+
+
+Line = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_printed)]
+
+
+class Words(Section):
+    """What a case file calls a parameter, or a noise."""
+
+    symbol: Annotated[
+        Line, AfterValidator(_symbol), parameter("its symbol in LaTeX, without dollars", 'symbol = "\\\\zeta"')
+    ] = ""
+    unit: Annotated[Line, parameter("its unit, 1 for none", 'unit = "rad/time"')] = ""
+    words: Annotated[Line, parameter("what it is, on an axis", 'words = "damping ratio"')] = ""
+
+    def of(self, plain: Quantity) -> Quantity:
+        """A quantity, as far as this says otherwise."""
+        latex = f"${self.symbol}$" if self.symbol else plain.latex
+        return replace(plain, words=self.words or plain.words, latex=latex, unit=self.unit or plain.unit)
+
+
 class Parameter(NamedTuple):
     """A parameter of a problem.
 
@@ -135,7 +158,7 @@ class Parameter(NamedTuple):
     @property
     def field(self) -> FieldInfo | None:
         """The range that it may have; None where that is not stated."""
-        return self.kind.fields().get(self.quantity.name.rpartition(".")[2])
+        return self.kind.__pydantic_fields__.get(self.quantity.name.rpartition(".")[2])
 
 
 class Parametrised:
@@ -145,7 +168,9 @@ class Parametrised:
         kind: the name by which case files know it.
         section: the first part of the keys of its parameters, such as "noise".
         words: parameters that the class itself decides, by their names.
-        stated: what case files say of it besides its `fields`, such as the `words`, by its names.
+        stated: what case files say of it besides its parameters, such as the `words`, by its names.
+        naming: what case files say of what it gives, by its names.
+        about: what they say of that.
         variants: other classes of this kind, with other parameters; a table of a case file tells by its keys which.
     """
 
@@ -154,16 +179,13 @@ class Parametrised:
     words: ClassVar[Mapping[str, str]] = {}
     stated: ClassVar[Mapping[str, FieldInfo]] = {}
     variants: ClassVar[Sequence[type[Parametrised]]] = ()
+    naming: ClassVar[Mapping[str, FieldInfo]] = {}
+    about: Words = Words()
     __pydantic_fields__: ClassVar[Mapping[str, FieldInfo]] = {}
 
     @classmethod
-    def fields(cls) -> Mapping[str, FieldInfo]:
-        """The ranges and meanings of the parameters by their names."""
-        return cls.__pydantic_fields__
-
-    @classmethod
     def takes(cls, key: str, table: Table) -> bool:
-        """Whether a table of a case file may have a key besides the `fields` and what is `stated`."""
+        """Whether a table of a case file may have a key besides the parameters and what is `stated`."""
         return False
 
     @classmethod
@@ -171,18 +193,24 @@ class Parametrised:
         """What a table of a case file states. Raises `ValueError` where a parameter is out of range."""
         return cls(**table)
 
+    def called(self, about: Words) -> Self:
+        """This one, which gives what is called so."""
+        object.__setattr__(self, "about", about)
+        return self
+
     def quantity_of(self, name: str) -> Quantity:
         """The name, the words and the unit of a parameter."""
-        key, field = f"{self.section}.{name}", self.fields().get(name)
+        key, field = f"{self.section}.{name}", self.__pydantic_fields__.get(name)
         if field is None:
             return unknown_parameter(key)
-        return Quantity(key, key, field.title or key, symbol_of(field), unit_of(field) or "1")
+        extra = _extra(field)
+        return Quantity(key, key, field.title or key, extra["symbol"], extra["unit"] or "1")
 
     @property
     def values(self) -> Mapping[str, float | str]:
         """The values of the parameters by their names; the words of the class last."""
         found: dict[str, float | str] = {}
-        for name in self.fields():
+        for name in self.__pydantic_fields__:
             value = vars(self)[name]
             if isinstance(value, Enum | int | float):
                 found[name] = str(value.value) if isinstance(value, Enum) else float(value)

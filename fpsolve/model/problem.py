@@ -16,13 +16,10 @@ from fpsolve.messages import Message
 from fpsolve.model.expressions import TIME
 from fpsolve.model.noise import Noise
 from fpsolve.model.noises.several import noises_of
-from fpsolve.model.parameters import DERIVED, Parameter, Parametrised
+from fpsolve.model.parameters import DERIVED, Parameter, Parametrised, Words
 from fpsolve.model.plane import LinearMotion, System, is_driven
 from fpsolve.model.plane import ParameterDerivative as ParameterDerivative
 from fpsolve.model.quantity import NOISE, Quantity
-
-RATE = "1/time"
-"""Unit of ξ for which the units of parameters of noises are stated."""
 
 
 @dataclass(frozen=True)
@@ -41,9 +38,9 @@ class Problem:
 
     Raises:
         TypeError: one of them is something else.
-        ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`; or the noises
-            are not those that the terms name; or one moves the phase over the ray of a jump, or nothing does; or
-            nothing is random, as under a harmonic load alone.
+        ValueError: white noise would drive the system in a way that has no meaning, see `White.motion`. Or the terms
+            name other noises. Or a noise, or nothing, moves the phase over the ray of a jump. Or nothing is random, as
+            under a harmonic load alone.
     """
 
     system: System
@@ -148,8 +145,12 @@ class Problem:
             for name, value in half.values.items():
                 key = f"{section}.{name}"
                 quantity = replace(half.quantity_of(name), name=key, symbol=key)
-                if isinstance(half, Noise) and name in half.of_xi and self.system.noise_unit != RATE:
-                    quantity = replace(quantity, unit="unknown")
+                if isinstance(half, Noise) and name in half.of_xi:
+                    if unit := half.about.unit:
+                        unit = half.of_xi[name].format("" if unit == "1" else f"{unit}*").rstrip("*") or "1"
+                    elif self.system.noise_unit == NOISE.unit:
+                        unit = quantity.unit
+                    quantity = replace(quantity, unit=unit or "unknown")
                 found[key] = Parameter(value, quantity, type(half))
         signs = Counter(each.quantity.shown.strip("$") for each in found.values())
         for key, each in found.items():
@@ -171,7 +172,7 @@ class Problem:
 
     @property
     def remarks(self) -> list[Message]:
-        """What limits the meaning of its parameters: of the noise, then of the system."""
+        """Limits of the meaning of its parameters: of the noise, then of the system."""
         return [remark for half in (*self.noise.parts.values(), self.system) for remark in half.remarks]
 
     def at(self, values: Mapping[str, float | str]) -> Problem:
@@ -185,7 +186,9 @@ class Problem:
             if section not in known:
                 raise ValueError(f"got {key}; the parameters are {', '.join(self.values)}")
             new.setdefault(section, {})[name] = value
-        halves = {key: _at(half, tuple(new[key].items())) if key in new else half for key, half in known.items()}
+        halves = {
+            key: _at(half, tuple(new[key].items()), half.about) if key in new else half for key, half in known.items()
+        }
         noises = dict(zip(self.noise.parts, [*halves.values()][1:], strict=True))
         return Problem(cast("System", halves[self.system.section]), noises_of(cast("dict[str, Noise]", noises)))
 
@@ -212,14 +215,14 @@ class Problem:
 
     @property
     def noise_quantity(self) -> Quantity:
-        """ξ, whose unit the system decides."""
-        return replace(NOISE, unit=self.system.noise_unit)
+        """ξ, as the noise states it, or else in the unit that the system decides."""
+        return self.valued.about.of(replace(NOISE, unit=self.system.noise_unit))
 
 
 @lru_cache(1024)  # sets of a sweep share the halves that are alike, and what these know
-def _at(half: Parametrised, values: tuple[tuple[str, float | str], ...]) -> Parametrised:
+def _at(half: Parametrised, values: tuple[tuple[str, float | str], ...], about: Words) -> Parametrised:
     """A system or a noise with other values of some parameters."""
-    return half.at(dict(values))
+    return half.at(dict(values)).called(about)
 
 
 def _of_noise(quantity: Quantity) -> Quantity:

@@ -188,8 +188,7 @@ def response_quantities(states: Sequence[str], *, has_wall: bool, is_linear: boo
     unit, (x, v) = "unknown", (*states, *states)[:2]
     squares = [(f"{each}_squared", f"⟨{each}²⟩", f"mean of {each}²", unit) for each in states]
     means = _means(
-        (x, f"⟨{x}⟩", f"mean of {x}", unit),
-        (v, f"⟨{v}⟩", f"mean of {v}", unit),
+        *((each, f"⟨{each}⟩", f"mean of {each}", unit) for each in (x, v)),
         ("amplitude", "⟨A⟩", "mean of the amplitude", unit),
         ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", unit),
         ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", unit),

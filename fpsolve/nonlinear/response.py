@@ -47,8 +47,8 @@ AT_ONE_PHASE = 2.0
 class StationaryResponse(Result, NearRest):
     """The stationary density over amplitude, phase and noise, x₁ = a cos φ and x₂ = −s a sin φ.
 
-    s is the `aspect` of the system, ω for an oscillator, and φ is in the half-turn before the wall, where x₁ ≥ 0 if
-    that is at x₁ = 0. Without a wall (x₁, x₂) and (−x₁, −x₂) are alike, and densities of a, φ and ξ are of both.
+    s is the `aspect` of the system, ω for an oscillator. φ is in the half-turn before the wall, x₁ ≥ 0 for a wall at
+    x₁ = 0. Without a wall (x₁, x₂) and (−x₁, −x₂) are alike, and densities of a, φ and ξ are of both.
 
     Attributes:
         problem: what it is of.

@@ -106,7 +106,7 @@ class Certificate(Record):
 
 @dataclass(frozen=True)
 class Enclosure:
-    """What is proven of a number: lower ≤ it ≤ upper.
+    """Proven bounds of a number: lower ≤ it ≤ upper.
 
     Attributes:
         certificate: from which they follow; None where nothing is proven. A bound that is not proven is infinite.

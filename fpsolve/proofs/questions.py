@@ -76,9 +76,9 @@ def prove(
     True
 
     Args:
-        problem: a motion and its noise. Bounds hold for the exact values of the floats that the certificate states, the
-            matrices, ln R and the law of the noise, and for a phase of a jump within 1e-12 of a multiple of π/4 for
-            that multiple. A coefficient that is a function counts as the a + bξ that its values show.
+        problem: a motion and its noise. Bounds hold for the exact floats of the certificate: the matrices, ln R and the
+            law of the noise. A phase of a jump within 1e-12 of a multiple of π/4 counts as that multiple. A coefficient
+            that is a function counts as the a + bξ that its values show.
         p: order of the moment, as it stands.
         width: wanted upper − lower, in 1/time; 1e-7 of the scale of Λ(p) if None.
         budget: half of its `seconds` of the processor are for a bound, which may take a third more.

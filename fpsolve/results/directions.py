@@ -73,7 +73,7 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     stationary = next((each for each in found if not each.pair.p), None)
     tilted = [each for each in found if each.pair.p]
     _write_numbers(grid, stationary, tilted or found, curve, folder)
-    along = {f"along_{side}": f"{axis.words} ({axis.unit})" for side, axis in zip("xy", grid.quantities, strict=True)}
+    along = {f"along_{side}": axis.in_words() for side, axis in zip("xy", grid.quantities, strict=True)}
     facts = {**facts_of_curve(curve), **along}
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]

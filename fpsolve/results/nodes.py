@@ -101,8 +101,7 @@ class Nodes:
     @property
     def axis(self) -> str:
         """What stands along y, with its unit."""
-        unit = self.problem.noise_quantity.unit_in_words
-        return f"noise ξ ({unit})" if unit else "noise ξ"
+        return self.problem.noise_quantity.in_words(" ξ")
 
     @property
     def along_y(self) -> str:

@@ -74,7 +74,7 @@ class Table(dict[str, Column]):
         self.messages[curve] = "; ".join(text for texts in result.remarks.values() for text in texts)
 
     def row(self, number: int) -> dict[str, Cell]:
-        """What is no function of p of the curve with a number, by the names of the columns."""
+        """The summary numbers of a set by its number, by the names of the columns."""
         return {
             name: _cell(each.quantity, each.values[number - 1].item())
             for name, each in self.items()
@@ -82,7 +82,7 @@ class Table(dict[str, Column]):
         }
 
     def over_p(self, number: int) -> list[dict[str, Cell]]:
-        """What is a function of p of the curve with a number, at each p that was solved."""
+        """The functions of p of a set by its number, at each solved p."""
         columns = {name: each.values[number - 1] for name, each in self.items() if each.quantity.dims}
         solved = np.flatnonzero(~np.isnan(columns[MOMENT.name])).tolist() if self.p.size else ()
         numbers = {"p": self.p, **columns}

@@ -94,7 +94,7 @@ class MomentEstimate:
 
 @dataclass(frozen=True, repr=False)
 class MonteCarlo(Result):
-    """What a simulation of one parameter set found.
+    """The results of a simulation of one parameter set.
 
     Attributes:
         estimates: Λ(p), in the order of p.
@@ -105,8 +105,8 @@ class MonteCarlo(Result):
         warnings: what limits these numbers, each with its criterion.
         interrupted: whether the simulation was stopped early.
         parameters: of the problem, by keys such as "noise.D0".
-        wall: at a wall of more than two variables the fast impacts in unit time and the share of time at rest, by the
-            names of `OF_STOPS`, with their standard errors; else nothing.
+        wall: for a wall of more than two variables fast impacts in unit time and the share of time at rest, with
+            standard errors, by the names of `OF_STOPS`.
     """
 
     estimates: tuple[MomentEstimate, ...]
@@ -183,8 +183,8 @@ def simulate(
     Args:
         problem: any linear motion, an oscillator without its c₂ and c₃, and its noise.
         p: orders of the moments, one or several.
-        estimator: "direct", cheap and for moderate p; "population", one simulation for each p; None for the former,
-            and for the latter at those p, nine at most, at which too few paths carry the mean.
+        estimator: "direct", cheap and for moderate p; "population", one simulation for each p. None is the former, and
+            the latter at nine p at most at which too few paths carry the mean.
         paths: how many; a multiple of 32 is used.
         time: length of the paths after the transient; 64 transients if None, and 16 beyond the plane, where
             they are longer. Whole transients are used.

@@ -89,7 +89,7 @@ def obstacles(
     elif (h if step is None else step) < least:
         found["step"] = (
             f"one transient, {transient:.3g}, takes {transient / h:.2g} steps of {h:.3g}, which {reason} requires; "
-            f"must be at most {_LONGEST:.0e}; bring the times of noise and oscillator nearer to each other"
+            f"must be at most {_LONGEST:.0e}; change {reason}, so that it allows steps >= {least:.3g}"
         )
     if time is not None and not 2 * transient * (1 - 1e-12) <= time:
         found["time"] = (

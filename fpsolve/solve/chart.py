@@ -37,7 +37,7 @@ CLOSED_FORM_NODES = 41
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """What a case says of stability in a plane of two parameters.
+    """Stability in a plane of two parameters.
 
     Attributes:
         lines: one for each entry of `lines` that is begun, in their order.

@@ -143,7 +143,7 @@ class CurveResponse(NearRest):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurveResult(Result):
-    """What was computed for one parameter set: numbers and messages, which a record can hold.
+    """The numbers and messages of one parameter set, which a record can hold.
 
     Attributes:
         curve: the parameters, the oscillator and the noise.
@@ -244,7 +244,7 @@ class CurveResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCurve:
-    """What the simulation of one parameter set found.
+    """The simulation of one parameter set.
 
     Attributes:
         curve: the parameter set.

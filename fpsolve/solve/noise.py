@@ -174,14 +174,14 @@ def refuse_wrong_case(case: Case, wanted_of: str, terms: int) -> None:
             raise FpsolveError(f"got --terms {terms} for {case.path}: {error}") from None
         if isinstance(case.system, VibroImpactOscillator) and (case.vary.file or IMPACT in case.vary.keys):
             raise FpsolveError(
-                f"got --terms {terms} for {case.path}, whose [oscillator] becomes an equation, and which varies its "
-                "impact law or has its sets in a file; leave out [vary], or write the system as an equation"
+                f"got --terms {terms} for {case.path}, whose [oscillator] then becomes an equation; leave out [vary] "
+                "of the impact law or with a file, or write the system as an equation"
             )
     place = {"1/time": "damping", "1/time²": "stiffness"}.get(unit, noise_in)
     if place != noise_in:
         raise FpsolveError(
-            f"{case.path}: has its noise in the {place}, but the {noise_in} was measured; use [oscillator] for noise "
-            'in the damping, and [system] with kind = "parametric" for noise in the stiffness'
+            f"{case.path}: has its noise in the {place}, but the file has the {noise_in}; use [oscillator] for noise "
+            'in the damping, [system] with kind = "parametric" for the stiffness'
         )
     if case.units.time not in ("time", "s"):
         raise FpsolveError(f"{case.path}: has the unit of time {case.units.time}, and measurements are in s; use s")

@@ -92,7 +92,7 @@ def refuse_mesh(case: Case) -> None:
                 if space.size > most:
                     raise MeshError(
                         f"makes {space.size} unknowns; must be at most budget.unknowns = {most}; use fewer cells or "
-                        "lower degrees, or a larger [budget]"
+                        f"lower degrees, or budget.unknowns = {space.size}"
                     )
     except (MeshError, OSError, ValueError) as failure:
         place, value = (("mesh", "file"), case.mesh.file) if case.mesh.file else (("mesh",), stated)

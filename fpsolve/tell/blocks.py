@@ -59,7 +59,7 @@ def filled(
 
 @dataclass(frozen=True)
 class Sentence:
-    """What numbers mean, in one sentence or a few.
+    """The meaning of numbers, in one sentence or a few.
 
     Attributes:
         text: the sentence, or nothing.
@@ -94,7 +94,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Note:
-    """What limits the numbers, or is remarkable.
+    """A limit of the numbers, or a remark.
 
     Attributes:
         severity: how much it means.

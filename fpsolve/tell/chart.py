@@ -65,7 +65,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
             for points in chart.closed_forms[i]:
                 axes.plot(*points.T, ":", color=f"C{i}", zorder=3)
         if any(chart.closed_forms):
-            axes.plot([], [], ":", color="0.35", label="closed form, Eqs. (38)-(39), in the colour of its line")
+            axes.plot([], [], ":", color="0.35", label="perturbation theory, Eqs. (38)-(39)")
         labels = " ".join(label for line in chart.lines for branch in line.branches for label in branch.labels)
         for start, (name, marker) in SPECIAL.items():
             if start in labels:

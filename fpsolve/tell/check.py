@@ -15,13 +15,13 @@ from fpsolve.tell.text import EACH, ROWS
 def show(case: Case, comparisons: Sequence[Comparison]) -> Iterator[Block]:
     """A row for each value, or of many values for those that differ, and how many agree."""
     if not comparisons:
-        yield Sentence(f"{case.name}: nothing is expected; add [[expect]] to the case")
+        yield Sentence(f"{case.name}: the case expects no value; add [[expect]] to it")
         return
     shown = comparisons if len(comparisons) <= ROWS else [each for each in comparisons if not each.met]
     if shown:
         yield _grid(case, shown[:ROWS], is_short=len(comparisons) > EACH)
     if len(shown) > ROWS:
-        yield Sentence(f"{case.name}: {len(shown) - ROWS} more differ")
+        yield Sentence(f"{case.name}: {len(shown) - ROWS} more values differ")
     yield Sentence(agreement(comparisons) if shown else f"{case.name}: {agreement(comparisons)}")
 
 

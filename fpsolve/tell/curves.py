@@ -64,8 +64,8 @@ def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[B
     kinds = {"converged": whole, "with warnings": counts.total() - whole - failed, "not converged": failed}
     states = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
     is_short = len(results) > ROWS and failed > FAILURES
-    shown = f"; of those that are not converged the first {FAILURES} are shown" if is_short else ""
-    yield Sentence(f"{len(results)} curves: {states}{shown}; all numbers are in curves.csv and results.nc")
+    shown = f"; the table has the first {FAILURES} that are not converged" if is_short else ""
+    yield Sentence(f"{len(results)} parameter sets: {states}{shown}; all numbers are in curves.csv and results.nc")
 
 
 def _states(table: Table) -> list[Status]:

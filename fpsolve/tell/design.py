@@ -34,7 +34,7 @@ def show(case: Case, outcome: DesignOutcome) -> Iterator[Block]:
     if len(keys) > 1:
         measures = ", ".join(f"{key} / {outcome.units[key]:.6g}" for key in keys)
         told = f"the square root of the sum of the squares of the changes of {measures}"
-        yield Sentence(f"the nearest such point, at a distance of {found.distance:.6g}: {told}")
+        yield Sentence(f"This is the nearest such point. Its distance, {told}, is {found.distance:.6g}.")
 
 
 def found_of(outcome: DesignOutcome) -> str:

@@ -390,15 +390,15 @@ def field_of(case: Case, p: object) -> Answer:
     stationary = solver.pair(0.0)
     density, pair = stationary_density(stationary), solver.pair(float(str(p)))  # which refuses one that misleads
     grid = density.grid
-    about = Quantity("", "", "density", unit=grid.unit), case.problem.noise_quantity
-    unit, noise_unit = (f" ({unit})" if (unit := each.timed(case.units.time).unit_in_words) else "" for each in about)
+    unit = Quantity("", "", "", unit=grid.unit).timed(case.units.time).in_words()
     if case.method.pictures == DIRECTIONS:
         found = [density, *([tilted_density(pair)] if pair.p else [])]
-        names = [f"{each.words} ({each.unit})" for each in grid.quantities]
+        names = [each.in_words() for each in grid.quantities]
         panels = [panel(each.name + unit, grid.first, grid.second, each.values, names) for each in found]
         said = [Sentence(repr(each)) for each in found]
     else:
-        nodes, names = Nodes.of(pair).seen(pair), ["phase φ (rad)", f"noise ξ{noise_unit}"]
+        noise = case.problem.noise_quantity.timed(case.units.time)
+        nodes, names = Nodes.of(pair).seen(pair), ["phase φ (rad)", noise.in_words(" ξ")]
         draw = partial(panel, x=nodes.phi.ravel(), y=nodes.y, names=names, is_chain=nodes.is_lines)
         panels = [
             draw(f"eigenfunction T of p = {pair.p:g}", values=nodes.fields(pair).T),
@@ -499,7 +499,7 @@ class Explored:
 
 
 def explore(problem: Problem | Case | str | Path) -> Explored:
-    """What `fpsolve explore` shows, in a notebook: Λ(p) with a slider for every parameter.
+    """`fpsolve explore` in a notebook: Λ(p) with a slider for every parameter.
 
     The page is served by this process to this machine alone, at a free port of 127.0.0.1.
 

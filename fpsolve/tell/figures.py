@@ -263,7 +263,7 @@ def draw_series(
         axes.plot(series[i].line_x, series[i].line_y, **look)
     if theories:
         equation = (about.closed_form or MOMENT.closed_form) + ", reduced noise" * case.theory_reduces_noise
-        words = f"perturbation, Eq. {equation}" + f", of {len(theories)} curves" * (not is_few)
+        words = f"perturbation, Eq. {equation}" + f", of {len(theories)} parameter sets" * (not is_few)
         axes.plot([], [], color="0.35" if is_few else "black", linestyle="-" if is_few else "--", label=words)
     if dots.size:
         draw_dots(axes, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black", zorder=5)
@@ -302,7 +302,7 @@ def _draw_many(axes: Axes, case: Case, series: Sequence[Series]) -> Sequence[Col
         if len(known) == 1:
             axes.plot(*known.T, "o", color=colour)
     axes.autoscale_view()
-    words = "number of the curve" if key is None else label_of(case.about(key).attributes, 36)
+    words = "number of the parameter set" if key is None else label_of(case.about(key).attributes, 36)
     bar = axes.figure.colorbar(lines, ax=axes, pad=0.02, label=words)
     if scale == "log":
         plain_numbers(bar.ax.yaxis)

@@ -45,17 +45,17 @@ def notes(
         for group in list(kinds.values())[:NOTES]:
             worst, whose = max(group, key=lambda one: -math.inf if one[0].size is None else one[0].size)
             curves = {curve.number: curve for _, curve in group}
-            who, rest = f"{case.name}: {len(curves)} of {count} curves", ""
+            who, rest = f"{case.name}: {len(curves)} of {count} parameter sets", ""
             if len(curves) <= NAMED:
                 named = " and ".join(curve.label for curve in curves.values())
                 who = f"{case.name}, {named}" if named else case.name
             if any(message.data != worst.data for message, _ in group):
-                words = "these numbers are of" if worst.size is None else "most for"
+                words = "these numbers are of" if worst.size is None else "worst for"
                 rest = f"; {words} {whose.label}" if len(curves) > 1 else f"; and {len(group) - 1} more like this one"
                 rest += f" (all in {file})" if file else ""
             yield Note(severity, f"{who}: {worst}{rest}")
         if (left := len(kinds) - NOTES) > 0:
-            yield Note(severity, f"{case.name}: {left} more of this kind{f' are in {file}' if file else ''}")
+            yield Note(severity, f"{case.name}: {left} more messages of this kind{f' are in {file}' if file else ''}")
 
 
 def shows_perturbed_moments(case: Case, count: int) -> bool:
@@ -70,16 +70,16 @@ def note_on(name: str, message: str) -> Note:
     return Note(known.severity, f"{name}: {known}")
 
 
-def left_out(case: Case, *, monte_carlo: bool) -> Iterator[Note]:
-    """What a run leaves out: dots of a simulation that has none to give, pictures, and what nobody has named."""
+def left_out(case: Case, *, monte_carlo: bool, is_first: bool) -> Iterator[Note]:
+    """What a run leaves out: dots of a simulation that has none to give, pictures, and at first what nobody named."""
     told = list[str]()
     if monte_carlo and case.figure.y == STABILITY_INDEX.name:
-        told.append("a simulation gives no stability index, so that the figure has no dots")
+        told.append("a simulation gives no stability index, so that the figure has no dots of it")
     if case.output.asks_for_eigenfunctions and (why := case.method.no_picture):
         told.append(f"no eigenfunctions are written: {why}")
     if case.leaves_out_response:
-        why = f"no stationary response is computed, as there are more than {MOST_DRAWN} curves"
-        told.append(f'{why}; name "{RESPONSE}" in [output] quantities to have its means')
-    if case.unasked:
-        told.append(f"there are also {', '.join(case.unasked)}: name them in [output] quantities, or --all")
+        why = f"no stationary response is computed, as there are more than {MOST_DRAWN} parameter sets"
+        told.append(f'{why}; name "{RESPONSE}" in [output] quantities to compute its means')
+    if case.unasked and is_first:
+        told.append(f"fpsolve also computes {', '.join(case.unasked)}: name them in [output] quantities, or add --all")
     yield from (Note(Severity.NOTE, f"{case.name}: {text}") for text in told)

@@ -169,13 +169,13 @@ def moment_grid(case: Case, result: CurveResult) -> Grid:
 PATH, SQUARE = "almost every path", "the mean square"
 """What λ and Λ(2) tell of."""
 BURSTS = (
-    "Where the mean square grows though almost every path decays, rare paths carry it in bursts: a design that is "
-    "judged by the mean square, by energy or by fatigue is unstable, though one record most likely looks calm."
+    "Where the mean square grows and almost every path decays, rare paths carry the growth in bursts. Judged by its "
+    "mean square or its energy the system is unstable there, although one record most likely looks calm."
 )
 
 TREATED = {
-    "exact": "that of Eq. (7) as it stands",
-    "ou-reduction": "Ornstein-Uhlenbeck noise in place of that of Eq. (7), as Eqs. (12)-(14) reduce it",
+    "exact": "the noise is that of Eq. (7)",
+    "ou-reduction": "Ornstein-Uhlenbeck noise, Eqs. (12)-(14), replaces the noise of Eq. (7)",
 }
 """What the noise is, by its treatment."""
 
@@ -189,10 +189,10 @@ def verdicts(case: Case, results: Sequence[CurveResult], table: Table) -> Iterat
     yield Sentence("", case.headline)
     for key, stated in case.parameters.items():
         if key.endswith(".treatment") and key not in case.vary.keys:
-            yield Sentence(f'{key} = "{stated.value}": the noise is {TREATED[str(stated.value)]}.')
+            yield Sentence(f'{key} = "{stated.value}": {TREATED[str(stated.value)]}.')
     signs = _signs(case, table)
     if len(results) > EACH:
-        told = [f"{what} decays in {sum(of < 0)} curves, and grows in {sum(of > 0)}" for what, of in signs.items()]
+        told = [f"{what} decays in {sum(of < 0)} parameter sets, grows in {sum(of > 0)}" for what, of in signs.items()]
         yield Sentence(_sentence(told))
     else:
         for each in results:
@@ -227,7 +227,7 @@ def verdict(case: Case, result: CurveResult) -> str:
             if what == PATH and sign > 0:
                 settles = ", and settles into the stationary response" * (result.response is not None)
                 is_bounded = result.curve.problem.linear.cubic
-                told[0] += f" near rest{settles}" if is_bounded else ", and passes every level in the end"
+                told[0] += f" near rest{settles}" if is_bounded else ", without bound"
     return _sentence(told)
 
 
@@ -242,15 +242,15 @@ def meaning(result: CurveResult) -> Iterator[Sentence]:
     if index:
         power, number = digits(abs(index.value), index.error_estimate, 4), f"δ_p = {short(index)}"
         yield Sentence(
-            f"{number} > 0: moments of the orders 0 < p < δ_p decay, those of p > δ_p grow. The "
+            f"{number} > 0: moments of order p decay for 0 < p < δ_p and grow for p > δ_p. The "
             f"probability that a path ever exceeds A times its start, {SYMBOL}, falls as A^-{power}."
             if index.value > 0
-            else f"{number} < 0: moments of the orders δ_p < p < 0 decay, as almost every path grows. The "
+            else f"{number} < 0: moments of order p decay for δ_p < p < 0, as almost every path grows. The "
             f"probability that a path ever falls below a small share a of its start goes as a^{power}."
         )
     if critical:
         loss = "more loss" if critical.value < 1 else "any loss"
         yield Sentence(
-            f"R_c = {short(critical)}: with this factor of the speed at an impact λ would be 0; {loss} makes almost "
-            "every path decay."
+            f"R_c = {short(critical)}: λ would be 0 if an impact multiplied the speed by this factor; {loss} makes "
+            "almost every path decay."
         )

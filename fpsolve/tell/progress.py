@@ -48,7 +48,7 @@ Advance = Callable[..., None]
 
 @dataclass(frozen=True)
 class Watch:
-    """What is shown of the work on a case; by default nothing.
+    """Shows the work on a case; by default nothing.
 
     Attributes:
         bar: gives a phase what it shall call for its progress; a chart has two phases at a time.
@@ -128,9 +128,9 @@ class Bars:
 
 
 def waiting(meter: Meter) -> str:
-    """Which number is solved, and what is left for it and the others: "Λ″(0), 3 of 5, 12,400 unknowns, 80 s left"."""
+    """Which number is solved, and its longest time: "Λ″(0), 3 of 5, 12,400 unknowns, at most 80 s"."""
     of = f", {meter.count} of {meter.planned}" * (meter.planned > 1)
-    return f"{meter.number}{of}, {meter.unknowns:,} unknowns, {max(meter.seconds - meter.spent, 0):.0f} s left"
+    return f"{meter.number}{of}, {meter.unknowns:,} unknowns, at most {max(meter.seconds - meter.spent, 0):.0f} s"
 
 
 def counted(phase: Phase, done: int, failed: int) -> str:

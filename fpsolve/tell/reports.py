@@ -27,7 +27,7 @@ from fpsolve.tell.notes import note_on
 from fpsolve.tell.progress import Phase, Watch
 from fpsolve.tell.text import EACH
 
-INCOMPLETE = "Not complete: the run ended early, and this is what was done."
+INCOMPLETE = "Not complete: the run ended early. The page shows the results up to then."
 """The state of a run that ended early."""
 
 
@@ -165,7 +165,7 @@ def about(case: Case) -> Iterator[Block]:
         )
     if case.planned > 1:
         keys = ", ".join(case.vary.keys)
-        yield Sentence(f"{case.planned} curves, over {keys}; the equation above is that of the first one.")
+        yield Sentence(f"{case.planned} parameter sets, over {keys}; the equation above is that of the first one.")
     rows = []
     for key, each in problem.parameters.items():
         quantity = each.quantity.timed(case.units.time)

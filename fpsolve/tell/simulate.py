@@ -57,7 +57,7 @@ def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[Curv
     if not (is_short and over_p):
         yield exponent_grid(case, simulated, solved)
         if not is_short:
-            yield Sentence(f"{len(simulated)} curves; all numbers are in {MONTE_CARLO}, one for each curve")
+            yield Sentence(f"{len(simulated)} parameter sets; all numbers are in {MONTE_CARLO}, a file for each set")
     for each in simulated if is_short else ():
         result = solved.get(each.curve.number)
         yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)

@@ -85,9 +85,9 @@ def last_line(folder: Path, what: str, seconds: float, known: str = "") -> Sente
 
 
 def done_of(case: Case, done: int, failed: int = 0, fault: str = "not converged") -> str:
-    """How many curves of a case are done: "3 curves", "2 of 3 curves, 1 not converged"."""
+    """How many sets of a case are done: "3 parameter sets", "2 of 3 parameter sets, 1 not converged"."""
     count = f"{done} of {case.planned}" if done < case.planned else f"{done}"
-    return f"{count} {plural('curve', case.planned)}{f', {failed} {fault}' if failed else ''}"
+    return f"{count} {plural('parameter set', case.planned)}{f', {failed} {fault}' if failed else ''}"
 
 
 def known_of(case: Case, known: int) -> str:

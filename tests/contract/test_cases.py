@@ -93,7 +93,7 @@ GUESS = '{ quantity = "moment", p = 2.0, value = 0.0012, atol = 1e-4, source = "
         ("minimal", "title=Mine", 0, "2 of 2 ok"),
         ("minimal", "oscillator.c1=0.2", 1, "0 of 2 ok"),
         ("minimal", f"expect=[{GUESS}]", 0, "1 of 1 ok"),
-        ("fig1", "expect=[]", 0, "nothing is expected"),
+        ("fig1", "expect=[]", 0, "the case expects no value"),
     ],
 )
 def test_check_of_a_case_tells_by_its_code_whether_expectations_are_met(tmp_path, case, override, code, words):

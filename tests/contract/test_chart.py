@@ -122,7 +122,7 @@ def test_a_chart_of_which_no_point_is_solved_has_failed_for_one_reason(tmp_path)
     done = run(tmp_path, "chart", "case.toml", "--jobs", "1", case=LONG)
     told = " ".join(done.err.split())
     assert done.code == 3
-    assert told.count("Λ(2) is found at no point of the frame: Λ(2) did not converge: ") == 1
+    assert told.count("fpsolve found Λ(2) at no point of the frame: Λ(2) did not converge: ") == 1
     assert told.count("is not found for a delay so long") == 1
 
 

@@ -62,25 +62,26 @@ ROWS = [
         f"run case.toml {FAST}",
         0,
         "noise.D0 = 0.1: almost every path decays, halving in a time of 47900 … λ ┃ … 1 │ 0.001087570 │ … written: "
-        "results/case (2 curves, ",
+        "results/case (2 parameter sets, ",
         "",
     ),
     (f"run case.toml {FAST} --out elsewhere", 0, "written: elsewhere/case", ""),
     (
         f"run case.toml {FAST} --set oscillator.omega=2.0 --set budget.seconds=9.0",
         0,
-        'A test with oscillator.omega = 2.0 noise.treatment = "ou-reduction": the noise is … as Eqs. (12)-(14) '
-        "reduce it.",
+        'A test with oscillator.omega = 2.0 noise.treatment = "ou-reduction": Ornstein-Uhlenbeck noise, Eqs. '
+        "(12)-(14), replaces the noise of Eq. (7).",
         "",
     ),
     (
         "run case.toml --set moments.p=[1.5] --set output={figure=false}",
         0,
         "R_c",
-        "note: case: there are also rate_function, variance_rate, critical_restitution, excursions, sensitivities, "
-        "eigenfunctions: name them in [output] quantities, or --all",
+        "note: case: fpsolve also computes rate_function, variance_rate, critical_restitution, excursions, "
+        "sensitivities, "
+        "eigenfunctions: name them in [output] quantities, or add --all",
     ),
-    (f"run case.toml {FAST} --quiet", 0, "written: results/case (2 curves, ", None),
+    (f"run case.toml {FAST} --quiet", 0, "written: results/case (2 parameter sets, ", None),
     (
         "run case.toml " + FAILING,
         3,
@@ -90,7 +91,7 @@ ROWS = [
     (
         f"run case.toml {FAILING} --quiet",
         3,
-        "written: results/case (2 curves, 2 not converged, ",
+        "written: results/case (2 parameter sets, 2 not converged, ",
         "not converged: case",
     ),
     (
@@ -103,13 +104,13 @@ ROWS = [
         f"run case.toml {ALONE} --set noise.D0=0.1 --set oscillator.c1=-0.8 --all",
         0,
         "r_c │ none │",
-        "note: case: no r_c: almost surely stable for every r in (0, 1]",
+        "note: case: there is no r_c: almost surely stable for every r in (0, 1]",
     ),
     (
         f"run case.toml {ALONE} --set noise.D0=0.1 --set oscillator.c1=0.7 --all",
         0,
         "r_c │ none │",
-        "note: case: no r_c: unstable",
+        "note: case: there is no r_c: unstable",
     ),
     (
         f"run case.toml {FAST} --set \"figure={{ x = 'noise.D0', y = 'lyapunov_exponent' }}\"",
@@ -130,8 +131,8 @@ ROWS = [
         f"moments.rtol=1e-12 --set budget.unknowns=1000",
         3,
         "",
-        "not converged: case: Λ(2) did not converge: the next mesh has … more than budget.unknowns = 1000; best "
-        "value 3.429 … an estimated error of",
+        "not converged: case: Λ(2) was not found: it needs … the limit is 1,000 (try … The best value 3.429 … has "
+        "an estimated error of",
     ),
     (
         f"run case.toml {FAST} --set mesh={{xi_min=-4.0,xi_max=4.0}}",
@@ -140,7 +141,7 @@ ROWS = [
         "warning: case, noise.D0 = 0.1 and noise.D0 = 1: rtol = 1e-08 is not met … [mesh] phi_cells, xi_cells",
     ),
     # what a check prints
-    ("check case.toml", 0, "nothing is expected; add [[expect]]", ""),
+    ("check case.toml", 0, "the case expects no value; add [[expect]]", ""),
     ("check good.toml", 0, "see [/b] of [vary] … in [/x] of [vary] … ok", ""),
     ("check good.toml differs.toml", 1, "differs", ""),
     ("check good.toml --quiet", 0, "good: 2 of 2 ok", None),
@@ -322,7 +323,9 @@ def test_a_sigterm_ends_a_run_that_keeps_what_it_has(tmp_path, before):
             process.kill()
     assert process.returncode == 143
     assert re.search(
-        r"^interrupted after [1-9]\d* of 5000 curves; what was done is kept in results/case; run it again", err, re.M
+        r"^interrupted after [1-9]\d* of 5000 parameter sets; what was done is kept in results/case; run it again",
+        err,
+        re.M,
     )
     assert "Traceback" not in err
     assert files(tmp_path / "results/case") >= TABLES - {"summary.json"}  # which many sets have not

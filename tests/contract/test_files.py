@@ -168,7 +168,7 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_to_the_same_numbers(wh
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("{}", encoding="utf-8")
     told = interrupt(whole.case, tmp_path, 1)
-    assert told == f"interrupted after 1 of 2 curves; what was done is kept in {folder}; run it again to go on"
+    assert told == f"interrupted after 1 of 2 parameter sets; what was done is kept in {folder}; run it again to go on"
     summary = read_json(folder / "summary.json")
     assert (summary["complete"], summary["planned"], summary["done"], len(summary["curves"])) == (False, 2, 1, 1)
     assert TABLES | mine | {"eigenfunctions.pvd"} <= files(folder)
@@ -190,10 +190,10 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_to_the_same_numbers(wh
 def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, at):
     sets = ["vary={}", NUMBERS, "moments.p=[-1.0, 0.5, 1.0, 2.0]"]
     case = case_in(tmp_path, TEXT, sets)
-    assert interrupt(case, tmp_path, at).startswith("interrupted after 0 of 1 curve; what was done is kept in")
+    assert interrupt(case, tmp_path, at).startswith("interrupted after 0 of 1 parameter set; what was done is kept in")
     summary, rows = read_json(tmp_path / "test/summary.json"), read_csv(tmp_path / "test/moments.csv")
     assert (summary["complete"], summary["done"], summary["curves"][0]["status"]) == (False, 0, "partly")
-    assert "not everything is solved yet; the same command goes on" in summary["curves"][0]["warnings"]
+    assert "not everything is solved yet; run the same command again to go on" in summary["curves"][0]["warnings"]
     assert 0 < len(rows) < 4
     [result], [whole] = fpsolve.run(case, tmp_path), fpsolve.run(case, tmp_path / "whole")
     assert result.status is whole.status
@@ -261,7 +261,7 @@ def test_a_second_run_solves_what_has_changed_alone(kept, tmp_path, sets, known)
     done = run(tmp_path, "run", "case.toml", "--quiet", "--jobs", "1", "--set", NUMBERS, *options)
     count = len(rows := read_csv(tmp_path / "results/case/curves.csv"))
     end = f"; {known} of {count} known from an earlier run" * bool(known)
-    assert re.search(rf"written: results/case \({count} curves, [^;]*{end}\)$", done.out.strip()), done
+    assert re.search(rf"written: results/case \({count} parameter sets, [^;]*{end}\)$", done.out.strip()), done
     same = [row["seconds"] == before[row["noise.D0"]]["seconds"] for row in rows if row["noise.D0"] in before]
     assert sum(same) == known or "quantities" in " ".join(sets)
     for row in rows:
@@ -373,13 +373,13 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "output={quantities=['stability_index', 'lyapunov_exponent']}",
             ],
             "no index",
-            "no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]",
+            "fpsolve found no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]",
             "stability_index",
         ),
         (
             ["oscillator.epsilon=2.0", "budget.unknowns=100", "output={quantities=['lyapunov_exponent']}"],
             "failed",
-            "no λ: ",
+            "fpsolve found no λ: ",
             "lyapunov_exponent",
         ),
         (
@@ -390,7 +390,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "output={quantities=['moment','lyapunov_exponent'],eigenfunctions=[]}",
             ],
             "partly",
-            "no λ: ",
+            "fpsolve found no λ: ",
             "lyapunov_exponent",
         ),
         (
@@ -401,7 +401,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "output={quantities=['moment','lyapunov_exponent','stability_index','variance_rate'],eigenfunctions=[]}",
             ],
             "failed",
-            "no λ, δ_p, Λ″(0): ",
+            "fpsolve found no λ, δ_p, Λ″(0): ",
             "variance_rate",
         ),
         (
@@ -414,7 +414,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "mesh={phi_cells=1, xi_cells=2, phi_degree=8, xi_degree=8}",
             ],
             "partly",
-            "neither the stationary density nor eigenfunctions are written: ",
+            "fpsolve draws neither the stationary density nor eigenfunctions (λ",
             None,
         ),
     ],

@@ -282,7 +282,7 @@ def test_sea_at_a_buoy_has_its_measured_density_at_2_omega(kind, tmp_path):
     else:
         assert row["measured_over_fitted"] == pytest.approx(1, abs=1e-3)
         assert error == pytest.approx(measured["standard_error"] * omega**2 / 2, rel=0.5)
-        assert "off that of the best fit" in warned
+        assert "off the best fit" in warned
 
 
 def peaks(f):
@@ -328,7 +328,7 @@ SAID = [
     # what is said where no verdict can be told
     (AT_2, EXACT, "state its damping by --damping-ratio", ""),
     (f"{AT_2} --frequency 3 --damping-ratio 0.01", EXACT, "state their case by --case", ""),
-    (f"{SURE} --frequency 2 --terms 2", EXACT, "", "do not tell all parameters"),
+    (f"{SURE} --frequency 2 --terms 2", EXACT, "", "do not determine all parameters"),
 ]
 
 
@@ -382,7 +382,7 @@ REFUSED = {
     "m.csv --sided two --frequency 2 --record record.csv": "a spectrum and a record; leave out one",
     f"{FILE} --case my.toml": "has its noise in the damping",
     f"{FILE} --case my.toml --damping-ratio 0.1": "which --case states; leave it out",
-    f"{FILE} --of damping --case laws.toml --terms 2": "varies its impact law",
+    f"{FILE} --of damping --case laws.toml --terms 2": "leave out [vary] of the impact law",
     f"{FILE} --case names.toml --terms 2": "got the name first twice",
     f"{FILE} --case modes.toml --terms 2": "has one noise; write the system as an equation",
     "peaks.csv --sided one --frequency 2 --frequency 6": "take another kind, such as filter",

@@ -71,7 +71,7 @@ def test_bounds_and_verdicts_of_a_case_are_told_written_and_accepted(proven, dat
     assert (proven.code, proven.err) == (0, "")
     assert re.search(r"│ +Λ\(0\) │ +0 │ +0 │ +0 │ +is constant │", proven.out)
     assert "Proven: almost every path decays; the moment of order 2 decays." in proven.out
-    assert re.search(r"written: results/case \(1 curve, [\d.]+ s\)", proven.out)
+    assert re.search(r"written: results/case \(1 parameter set, [\d.]+ s\)", proven.out)
     assert set(data) == {"fpsolve", "case", "complete", "curves"}
     assert data["complete"] is True
     (curve,) = data["curves"]
@@ -88,7 +88,7 @@ def test_bounds_and_verdicts_of_a_case_are_told_written_and_accepted(proven, dat
     assert [certificate_checker.check(each) for each in entries] == 3 * [""]
     accepted, note = check(tmp_path, data).out.splitlines()
     assert accepted == "accepted: a.json (bounds on 3 numbers follow from their certificates)"
-    assert note == ("note: parameters are labels; the bounds are of the matrices and rates that the certificates state")
+    assert note == ("note: the parameters are labels; the bounds hold for the matrices and rates in the certificates")
 
 
 def set_moment(**change):
@@ -337,7 +337,7 @@ def test_the_check_tells_how_many_bounds_follow_and_what_does_not(tmp_path):
         "accepted: a.json (bounds on 1 number follow from their certificates)\n"
     )
     told = check(tmp_path, proof | {"complete": False})
-    assert "certificates; what proved them was interrupted)\n" in told.out
+    assert "certificates; the run that proved them was interrupted)\n" in told.out
     proof["curves"][0]["moments"][0]["upper"] = 0.0
     told = check(tmp_path, proof)
     assert (told.code, told.out) == (REJECTED, "rejected: a.json (1 objection, bounds on 1 number)\n")
@@ -345,7 +345,7 @@ def test_the_check_tells_how_many_bounds_follow_and_what_does_not(tmp_path):
 
 
 TAILS = "--set", "noise.treatment=exact", "--set", "moments.p=[-0.5]"
-NOTHING_ELSE = "--check takes a proof.json and nothing else"
+NOTHING_ELSE = "--check takes a proof.json and no other option"
 
 
 @pytest.mark.parametrize(
@@ -408,7 +408,7 @@ def test_a_width_that_is_not_met_is_told_and_the_bounds_are_kept(tmp_path):
     ]
     done = run(tmp_path, "prove", "case.toml", "--width", "1e-30", *weak, "--quiet", case=GAUSSIAN)
     assert done.code == NOT_CONVERGED
-    assert "(1 curve, 1 not as close as wanted, " in done.out
+    assert "(1 parameter set, 1 not as close as wanted, " in done.out
     (moment,) = read_json(proof_in(tmp_path))["curves"][0]["moments"]
     assert moment["upper"] - moment["lower"] > 1e-30
 

@@ -58,10 +58,10 @@ REFUSED = {
         "moment(mesh=make_mesh(xi_min=-0.01))": "use more cells .* a wider noise interval",
         "STRONG.lyapunov_exponent()": "mesh",
         "STRONG.variance_rate()": "mesh",
-        "moment(NEIGHBOURS, budget=Budget(seconds=0.05))": "take some .* more than budget.seconds = 0.05; no mesh",
+        "moment(NEIGHBOURS, budget=Budget(seconds=0.05))": "needs some .* limit is 0.05 s .try --set budget.seconds=",
         "moment(STIFF)": "rounding alone may change it by ((?!budget).)*; use a larger rtol((?!budget).)*$",
         "moment(LARGE, -3.0, rtol=1e-4, budget=Budget(unknowns=200))": (
-            "not found on this mesh: ((?!use more cells).)*; use a larger rtol or a larger .budget.$"
+            "not found on this mesh: ((?!use more cells).)*; a larger rtol takes less$"
         ),
         "impact_rate(UNRESOLVED)": "budget",
         "critical_impact_factor(UNRESOLVED)": "budget",

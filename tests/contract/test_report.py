@@ -118,17 +118,17 @@ def test_of_many_curves_the_extreme_and_the_first_failed_ones_have_a_row(tmp_pat
     }
     least = found[min(known, key=known.get)]["lyapunov_exponent"]
     assert [float(row[1]) for row in rows if row[4] == "least λ"] == pytest.approx([least], rel=0.01)
-    assert f"Almost every path decays in 0 curves, and grows in {len(known)}." in done.out
-    end = f"60 curves: {len(known)} with warnings, {len(failed)} not converged; "
-    end += "of those that are not converged the first 20 are shown"
+    assert f"Almost every path decays in 0 parameter sets, grows in {len(known)}." in done.out
+    end = f"60 parameter sets: {len(known)} with warnings, {len(failed)} not converged; "
+    end += "the table has the first 20 that are not converged"
     assert f"{end}; all numbers are in curves.csv and results.nc" in done.out
     failures, warnings = notes(done.err).splitlines()
     assert re.fullmatch(
-        r"not converged: case: 38 of 60 curves: no λ: .* \[mesh\] phi_cells, .*; most for oscillator.epsilon = 1.5 .*",
+        r"not converged: case: 38 of 60 parameter sets: fpsolve found no λ: .*phi_cells.*; worst for osc.* = 1.5 .*",
         failures.replace("(", "", 1),
     )
     assert re.fullmatch(
-        r"warning: case: 22 of 60 curves: rtol = 1e-08 is not met by λ: .*; most for .* = \S+ \(all in curves.csv\)",
+        r"warning: case: 22 of 60 parameter sets: rtol = 1e-08 is not met by λ: .*; worst for .* \(all in curves.csv\)",
         warnings,
     )
 
@@ -156,8 +156,8 @@ def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
     weak = "perturbation theory, Eq. (37), is for weak noise"
     few = notes(run(tmp_path, *asked, case=TEXT).err)
     assert few.count("note: ") == 1
-    assert few.startswith(f"note: case, noise.D0 = 0.5 and noise.D0 = 1: {weak}: do not rely on it from |p| = 2 on")
-    assert few.endswith("; most for noise.D0 = 1 (all in curves.csv)\n")
+    assert few.startswith(f"note: case, noise.D0 = 0.5 and noise.D0 = 1: {weak}. Do not rely on it from |p| = 2 on")
+    assert few.endswith("; worst for noise.D0 = 1 (all in curves.csv)\n")
     many = run(tmp_path, *asked, "--set", "vary.noise.D0={start=0.3, stop=1.0, num=12}").err
     assert weak not in many  # a table of many curves has no column of it
     assert "perturbation theory, Eq. (37)" not in run(tmp_path, "check", *asked[1:]).err
@@ -169,13 +169,13 @@ def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
         (
             [],
             "Almost every path decays, halving in a time of 23.4; the mean square grows, doubling in a time of 24.7. "
-            "… rare paths carry it in bursts … Start with φ₀ = 0, stationary noise: P(sup ‖x‖ ≥ 2) between 0.288 and "
-            "0.436, P(sup ‖x‖ ≥ 4) between 0.117 and 0.177, P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717; ‖x‖ is the "
-            "length of (x, v), and ‖x₀‖ = 1. … δ_p = 1.302367 > 0: moments of the orders 0 < p < δ_p decay, those of "
-            "p > δ_p grow. … P(sup ‖x‖ ≥ A), falls as A^-1.302.",
+            "… rare paths carry the growth in bursts … Start with φ₀ = 0, stationary noise: P(sup ‖x‖ ≥ 2) between "
+            "0.288 and 0.436, P(sup ‖x‖ ≥ 4) between 0.117 and 0.177, P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717; ‖x‖ is "
+            "the length of (x, v), and ‖x₀‖ = 1. … δ_p = 1.302367 > 0: moments of order p decay for 0 < p < δ_p and "
+            "grow for p > δ_p. … P(sup ‖x‖ ≥ A), falls as A^-1.302.",
         ),
         (["noise.a=0.3"], "the mean square decays, halving"),
-        (["system.zeta=0.01"], "passes every level in the end; … δ_p = -"),
+        (["system.zeta=0.01"], "without bound; … δ_p = -"),
         (
             ["system.zeta=0.01", "system.drift=['v', '-x - 2*zeta*v - v**3 - xi*x']"],
             "Almost every path grows, doubling in a time of … near rest; the mean square",
@@ -200,7 +200,9 @@ def test_excursions_are_in_the_summary(tmp_path):
     sets = ["excursions.xi=0.8", "vary={'noise.a'=[0.8, 0.7]}"]
     done = run(tmp_path, "run", "case.toml", "--jobs", "1", *(f"--set={each}" for each in sets), case=BURSTS)
     assert done.code == 3
-    assert "noise.a = 0.7: no P(sup ‖x‖ ≥ A): got xi = 0.8; must be one of the states, -0.7, 0.7" in done.err
+    assert (
+        "noise.a = 0.7: fpsolve found no P(sup ‖x‖ ≥ A): got xi = 0.8; must be one of the states, -0.7, 0.7" in done.err
+    )
     assert run(tmp_path, "run", "case.toml", "--out", "all", case=BURSTS).code == 0
     [curve] = read_json(tmp_path / "all/case/summary.json")["curves"]
     found = curve["excursions"]
@@ -256,7 +258,7 @@ def test_the_report_is_one_safe_file_with_equation_numbers_meanings_pictures_and
         "ẍ = −x − 0.16 ẋ − ξ x",
         "ξ is noise of the kind telegraph, with standard deviation 0.8 and correlation time 0.5.",
         "Almost every path decays, halving in a time of 23.4; the mean square grows, doubling in a time of 24.7.",
-        "rare paths carry it in bursts",
+        "rare paths carry the growth in bursts",
         "P(sup ‖x‖ ≥ 8) between 0.0474 and 0.0717",
         "-0.0296213724",
         "-0.0396131, Eq. (39)",
@@ -373,9 +375,9 @@ p = [2.0]
 @pytest.mark.parametrize(
     ("text", "quantities", "told"),
     [
-        (OWN, ["moment"], "system.unused: in no rate and in no restitution, so that no result depends on it"),
+        (OWN, ["moment"], "system.unused: no rate and no restitution has it, so that no result depends on it"),
         (OWN, ["sensitivities"], "no sensitivities to system.c: the derivative of the system by it is not finite at 0"),
-        (OWN, ["moment", "impact_rate"], "no N: "),
+        (OWN, ["moment", "impact_rate"], "there is no N: "),
         (
             SEVERAL,
             ["moment", "eigenfunctions"],
@@ -393,4 +395,4 @@ def test_what_an_own_system_does_not_have_is_told(tmp_path, text, quantities, to
 def test_nothing_is_said_unasked_of_impacts_where_there_are_none(tmp_path):
     done = run(tmp_path, "run", "case.toml", "--set=output={ figure=false, eigenfunctions=[] }", case=OWN)
     assert (done.code, "no N" in done.err, "R_c" in done.out) == (0, False, False), done
-    assert "system.unused: in no rate" in done.err
+    assert "system.unused: no rate" in done.err

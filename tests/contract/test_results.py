@@ -18,6 +18,7 @@ from fpsolve.analysis import Axis, design, excursion, uncertainty
 from fpsolve.exponent import INDICES, Estimate, Failure
 from fpsolve.model import Telegraph, White
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
+from tests.contract.test_cases import CASES
 from tests.kit import TEXT, case_in, matrices, rates
 
 matplotlib.use("Agg")
@@ -283,6 +284,10 @@ def test_parameters_have_names_units_and_values():
     assert units == {"noise.sigma": "1/time^(3/2)", "noise.treatment": "unknown", "oscillator.omega": "rad/time"}
     plane = Problem(fpsolve.PlaneSystem(OSCILLATOR.terms, OSCILLATOR.jumps, epsilon=0.5), White(s=1.0))
     assert (plane.values["system.epsilon"], plane.noise_quantity.unit) == (0.5, "unknown")
+    named = [f"noise.axial.{each}" for each in ('unit="m/s^2"', 'symbol="u"', 'words="gust"')]
+    gusty = fpsolve.load_case(CASES / "systems/own_equation.toml", named).problem.at({"noise.axial.sigma": 2.0})
+    assert gusty.noise_quantity.title == "gust $u$ (m/s$^{2}$)"
+    assert gusty.parameters["noise.axial.sigma"].quantity.unit == "m/s^2*time^(-1/2)"
 
 
 UNITS = {

@@ -97,7 +97,7 @@ def test_a_simulation_that_ends_before_it_has_anything_leaves_nothing_of_an_earl
     place = tmp_path / "results/test"
     put(place, "run", "monte_carlo.json", "monte_carlo_response.png", "summary.json", "density.vtu")
     (place / "notes.txt").touch()
-    with pytest.raises(KeyboardInterrupt, match="interrupted after 0 of 1 curve; run it again to go on"):
+    with pytest.raises(KeyboardInterrupt, match="interrupted after 0 of 1 parameter set; run it again to go on"):
         simulate_case(case_in(tmp_path, CASE), tmp_path / "results", watch=interrupted(0))
     assert {path.name for path in place.iterdir()} == {"notes.txt", "records"}
 
@@ -105,8 +105,8 @@ def test_a_simulation_that_ends_before_it_has_anything_leaves_nothing_of_an_earl
 @pytest.mark.parametrize(
     ("values", "share", "written", "place", "warning"),
     [
-        ([0.1, 0.2], 0.501, {"monte_carlo.json"}, "curve 2 of 2", "Λ"),
-        ([0.1, 0.2, 0.3], 0.6, {"monte_carlo.json", "monte_carlo-2.json"}, "curve 2 of 3", "stopped early"),
+        ([0.1, 0.2], 0.501, {"monte_carlo.json"}, "parameter set 2 of 2", "Λ"),
+        ([0.1, 0.2, 0.3], 0.6, {"monte_carlo.json", "monte_carlo-2.json"}, "parameter set 2 of 3", "stopped early"),
     ],
 )
 def test_an_interrupted_simulation_keeps_what_is_done_and_goes_on(tmp_path, values, share, written, place, warning):
@@ -143,7 +143,7 @@ def test_an_interrupted_simulation_of_a_run_keeps_what_is_solved(tmp_path):
 def test_a_response_that_is_interrupted_is_said_to_be_missing(tmp_path):
     overrides = ["oscillator.c2=0.5", "oscillator.c1=0.8"]
     found = simulate_case(case_in(tmp_path, CASE, overrides), tmp_path / "results", watch=interrupted(0.34))
-    assert "curve 1 of 1; what was done is kept" in found.interruption
+    assert "parameter set 1 of 1; what was done is kept" in found.interruption
     told = read_json(tmp_path / "results/test/monte_carlo.json")
     assert any("no stationary response: stopped before it was reached" in each for each in told["warnings"])
 

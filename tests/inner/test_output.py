@@ -71,7 +71,7 @@ FIGURES = [
     (
         [many(9), BOTH, "figure.width='single column'"],
         P,
-        ["number of the curve"],
+        ["number of the parameter set"],
         ["finite elements"],
     ),
     ([many(8), "figure.mark=['stability_index', 'lyapunov_exponent']"], P, [], [INDEX, "slope $\\lambda$ at $p = 0$"]),

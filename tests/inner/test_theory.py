@@ -86,7 +86,7 @@ def test_note_on_strong_noise_has_the_largest_share_and_weak_noise_none():
     rest = values[1] - perturbation.moment_exponent(strong, noise, p)
     shares = np.abs(rest[p != 0]) / perturbation.moment_scale(strong, noise, p[p != 0])
     worst = shares.argmax()
-    told = f"is largest at p = {p[p != 0][worst]:g}, {rest[p != 0][worst]:.3g}, which is {shares.max():.0%}"
+    told = f"is {rest[p != 0][worst]:.3g}, {shares.max():.0%} of them, at p = {p[p != 0][worst]:g}"
     assert told in note
 
 

@@ -73,12 +73,16 @@ def raising(failure):
     ("place", "command", "message"),
     [
         ("fpsolve.commands.cases.Sweep", "run", "interrupted"),
-        ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 curves; run it again to go on"),
-        ("fpsolve.solve.sets.solve_curve", "check", "interrupted after 0 of 2 curves; run it again to start over"),
+        ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 parameter sets; run it again to go on"),
+        (
+            "fpsolve.solve.sets.solve_curve",
+            "check",
+            "interrupted after 0 of 2 parameter sets; run it again to start over",
+        ),
         (
             "fpsolve.commands.cases.write_curves",
             "run",
-            "interrupted after 2 of 2 curves; what was done is kept in results/case; run it again to go on",
+            "interrupted after 2 of 2 parameter sets; what was done is kept in results/case; run it again to go on",
         ),
         (
             "fpsolve.commands.options.print_blocks",
@@ -104,7 +108,7 @@ def test_an_interrupt_keeps_what_is_found_of_a_set_under_way(tmp_path, monkeypat
     done = run(tmp_path, "run", "case.toml", *asked, case=TEXT)
     assert (done.code, done.err.splitlines()[-1]) == (
         130,
-        "interrupted after 0 of 2 curves; what was done is kept in results/case; run it again to go on",
+        "interrupted after 0 of 2 parameter sets; what was done is kept in results/case; run it again to go on",
     )
     [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
     assert (len(curve["moments"]), curve["lyapunov_exponent"] is None, curve["variance_rate"]) == (3, False, None)
@@ -170,7 +174,7 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
     done = run(tmp_path, "run", "case.toml", "--all", *(f"--set={each}" for each in sets), case=TEXT)
     [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
     assert (done.code, curve["status"], curve["variance_rate"]) == (3, "partly", None)
-    assert any(each.startswith(f"no response: {said}") for each in curve["warnings"])
+    assert any(each.startswith(f"fpsolve found no response: {said}") for each in curve["warnings"])
     assert all(curve[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
 
 

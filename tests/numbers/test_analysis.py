@@ -346,7 +346,7 @@ def test_a_finer_mesh_beyond_the_budget_costs_the_sensitivities_that_need_it_alo
     budget = Budget(unknowns=ExponentSolver(problem, rtol=1e-3).pair(0.0).generator.size)
     found = sensitivities(problem, [], rtol=1e-3, budget=budget)
     assert "lyapunov_exponent" not in found.indices
-    assert any("p = 0 did not converge on a finer mesh: the next mesh has" in note for note in found.notes)
+    assert any("Λ(0) was not found on a finer mesh: it needs" in note for note in found.notes)
 
 
 UNIFORM = "x' = a*x + y + xi*x; y' = -x + a*y + xi*y"

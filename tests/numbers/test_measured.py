@@ -72,7 +72,7 @@ def test_fit_of_a_filter_without_a_peak_has_no_absurd_parameters():
     assert fit.parameters["zeta"] <= 10
     assert fit.parameters["omega"] < 1e3
     assert fit.spectral_density(4.0) == pytest.approx(OU.spectral_density(4.0), rel=1e-3)
-    assert any("do not tell all parameters" in each for each in fit.messages)
+    assert any("do not determine all parameters" in each for each in fit.messages)
 
 
 def test_standard_errors_of_bounded_noise_are_those_of_its_phase():

@@ -105,10 +105,10 @@ def test_law_spectrum_and_generator_of_a_noise_agree(noise, variance, spectrum):
     inner = np.abs(xi) < min(0.9 * noise.half_width, 3 * std)
     if hasattr(noise, "drift"):
         assert_allclose((rates @ xi)[inner], noise.drift(xi[inner]), atol=1e-3 * std / noise.correlation_time)
-    if isinstance(noise, NonGaussianNoise):  # −V′/τ₀
+    if isinstance(noise, NonGaussianNoise):  # −V′/τ₀ of V = −(D₀/τ₀) ln P_s
         at, h = xi[inner], 1e-5 * std
-        slope = (noise.potential(at + h) - noise.potential(at - h)) / (2 * h)
-        assert_allclose(noise.drift(at), -slope / 1.3, rtol=1e-7, atol=1e-8)
+        slope = (noise.log_density(at + h) - noise.log_density(at - h)) / (2 * h)
+        assert_allclose(noise.drift(at), slope * noise.D0 / 1.3**2, rtol=1e-7, atol=1e-8)
     for name in noise.differentiable:
         stated, h = noise.derivative(name), 1e-5 * abs(noise.values[name])
         if not h:
@@ -170,7 +170,6 @@ def test_support_of_eq_7_is_bounded_for_r0_below_1_only():
     assert noise.half_width == pytest.approx(2.0)
     assert_allclose(noise.density([-2.0, 2.02, 9.0]), 0, atol=0)
     assert noise.density(1.98) > 0
-    assert np.isnan(noise.potential(2.02))
     assert math.isinf(NonGaussianNoise(D0=0.3, tau0=0.5, r0=1.2).half_width)
     assert NonGaussianNoise(D0=1.0, tau0=0.5, r0=2.0).variance == math.inf
     assert SineWiener(amplitude=0.7, sigma=1.3).density(0.8) == 0
@@ -186,7 +185,7 @@ def test_reduction_of_eq_7_has_the_numbers_of_eqs_12_to_14_and_notes_its_varianc
         notes = [*ou.remarks]
         assert len(notes) == (not is_near)
         if notes:
-            told = f"its variance is {(2 - r0) * noise.variance:.4g}, and that of the noise, Eq. (10), is"
+            told = f"Its variance is {(2 - r0) * noise.variance:.4g}, and Eq. (10) gives"
             assert f"{told} {noise.variance:.4g}" in notes[0]
             assert f"|r0 - 1| = {abs(r0 - 1):.3g} > 0.1" in notes[0]
 

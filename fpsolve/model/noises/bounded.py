@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
@@ -154,7 +154,7 @@ class SineWiener(NoiseOfAngle):
 
     kind: ClassVar[str] = "sine-wiener"
     nu: ClassVar[float] = 0.0
-    of_xi: ClassVar[Sequence[str]] = ("amplitude",)
+    of_xi: ClassVar[Mapping[str, str]] = {"amplitude": "{}"}
 
 
 @strict_dataclass
@@ -188,7 +188,7 @@ class Bounded(NoiseOfAngle):
     ]
 
     kind: ClassVar[str] = "bounded"
-    of_xi: ClassVar[Sequence[str]] = ("mu",)
+    of_xi: ClassVar[Mapping[str, str]] = {"mu": "{}"}
 
     def __post_init__(self) -> None:
         if not (self.nu or self.sigma):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -50,7 +50,7 @@ class Filter(Gaussian):
     c1: Annotated[float, parameter("coefficient of y′", "c1 = 0.0", "$c_1$", "time", **ANY_SIGN)] = 0.0
 
     kind: ClassVar[str] = "filter"
-    of_xi: ClassVar[Sequence[str]] = ("s",)
+    of_xi: ClassVar[Mapping[str, str]] = {"s": "{}time^(-3/2)"}
     may_tilt: ClassVar[bool] = False
     variables: ClassVar[int] = 2
     stated: ClassVar[Mapping[str, FieldInfo]] = {

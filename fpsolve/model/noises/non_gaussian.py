@@ -100,7 +100,7 @@ class NonGaussianNoise(TreatedNoise):
     r0: Annotated[Departure, Field(lt=3)]
 
     kind: ClassVar[str] = "non-gaussian"
-    of_xi: ClassVar[Sequence[str]] = ("D0",)
+    of_xi: ClassVar[Mapping[str, str]] = {"D0": "{0}{0}time"}
     words: ClassVar[Mapping[str, str]] = {"treatment": "exact"}
     approximates_spectrum: ClassVar[bool] = True
 
@@ -121,14 +121,6 @@ class NonGaussianNoise(TreatedNoise):
     @property
     def end_exponent(self) -> float:
         return 1 / (1 - self.r0) if self.r0 < 1 else 0.0
-
-    def potential(self, xi: ArrayLike) -> FloatArray:
-        """V(ξ) of Eq. (8); its limit ξ²/2 for r₀ = 1; NaN outside the support."""
-        square = np.asarray(xi, dtype=float) ** 2
-        if self.r0 == 1:
-            return square / 2
-        with np.errstate(invalid="ignore", divide="ignore"):
-            return self.D0 / (self.tau0 * (self.r0 - 1)) * np.log1p(self.curvature * square)
 
     def drift(self, xi: ArrayLike) -> FloatArray:
         """−V′(ξ)/τ₀ = −(ξ/τ₀)/(1 + τ₀(r₀ − 1)ξ²/(2D₀)), Eq. (11) before its approximation."""

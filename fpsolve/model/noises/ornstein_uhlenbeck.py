@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 import numpy as np
@@ -23,7 +23,7 @@ Memory = Annotated[float, parameter("correlation time", "tau0 = 0.5", r"$\tau_0$
 class GaussianNoise(Gaussian):
     """A process with the law of Eq. (15), dξ = −α₀ ξ dt + σ₀ dW, whatever its parameters are."""
 
-    of_xi: ClassVar[Sequence[str]] = ("D0", "sigma", "standard_deviation")
+    of_xi: ClassVar[Mapping[str, str]] = {"D0": "{0}{0}time", "sigma": "{}time^(-1/2)", "standard_deviation": "{}"}
 
     if TYPE_CHECKING:  # a field or a property
 

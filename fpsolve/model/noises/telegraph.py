@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -36,7 +36,7 @@ class Telegraph(Chain):
     k: Annotated[float, parameter("rate of leaving each value", "k = 1.0", "$k$", "1/time", **SIZE)]
 
     kind: ClassVar[str] = "telegraph"
-    of_xi: ClassVar[Sequence[str]] = ("a",)
+    of_xi: ClassVar[Mapping[str, str]] = {"a": "{}"}
 
     @property
     def states(self) -> Sequence[float]:

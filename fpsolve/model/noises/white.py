@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, ClassVar
@@ -25,7 +25,7 @@ from fpsolve.model.plane import (
 
 
 class Interpretation(StrEnum):
-    """What ξ dt = s dW means where it multiplies the state.
+    """The meaning of ξ dt = s dW where it multiplies the state.
 
     STRATONOVICH: the limit of noise that remembers its value for ever shorter times.
     ITO: the limit of independent kicks; ½ Σ A² less in the drift, A the matrix that s dW multiplies.
@@ -87,7 +87,7 @@ class White(Memoryless):
     ] = Interpretation.STRATONOVICH
 
     kind: ClassVar[str] = "white"
-    of_xi: ClassVar[Sequence[str]] = ("s",)
+    of_xi: ClassVar[Mapping[str, str]] = {"s": "{}time^(1/2)"}
 
     @property
     def sense(self) -> str:

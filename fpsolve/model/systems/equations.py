@@ -13,12 +13,11 @@ from operator import itemgetter
 from typing import Annotated, ClassVar, Self, cast
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import ROUNDED, Constant, FloatArray, Linear, identity, one, real_number, shortened, shown
-from fpsolve.drawing import is_math
-from fpsolve.messages import Code, Message, is_control
+from fpsolve.messages import Code, Message
 from fpsolve.model.expressions import (
     HIGHEST_DEGREE,
     NUMBER,
@@ -38,7 +37,7 @@ from fpsolve.model.expressions import (
 )
 from fpsolve.model.faults import TableError, table_of
 from fpsolve.model.noises.clock import Clock, Wave
-from fpsolve.model.parameters import Section, Table, parameter, stated_field, unknown_parameter, without_unit
+from fpsolve.model.parameters import Section, Table, Words, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
     MOST_VARIABLES,
     CoefficientMatrix,
@@ -63,33 +62,14 @@ _NEWTON = 60
 _COMBINED = 'a sum of several is for kind = "modes", whose masses tell how these share an impact'
 
 
-def _printed(text: str) -> str:
-    if any(map(is_control, text)):
-        raise ValueError(f"got {shown(text)}; must have no control characters; leave them out")
-    return text
-
-
-def _symbol(text: str) -> str:
-    symbol = _printed(text).strip().strip("$")
-    if not is_math(f"${symbol}$"):
-        raise ValueError(f"got {shown(text)}; must be a symbol that matplotlib can draw; write, for example, \\\\zeta")
-    return symbol
-
-
 Place = tuple[str | int, ...]
 """Keys and numbers, by which what is wrong is found in a case file."""
-Line = Annotated[str, Field(min_length=1, max_length=80), AfterValidator(_printed)]
 
 
-class StatedParameter(Section):
+class StatedParameter(Words):
     """A parameter in a case file: a number, or a table with one."""
 
     value: Annotated[float, parameter("the value of a parameter", "omega = 1.0")]
-    symbol: Annotated[
-        Line, AfterValidator(_symbol), parameter("its symbol in LaTeX, without dollars", 'symbol = "\\\\zeta"')
-    ] = ""
-    unit: Annotated[Line, parameter("its unit, 1 for none", 'unit = "rad/time"')] = "unknown"
-    words: Annotated[Line, parameter("what it is, on an axis", 'words = "damping ratio"')] = ""
 
 
 class StatedWall(Section):
@@ -300,7 +280,9 @@ class EquationSystem(System):
             TableError: one is no number, or two have one symbol.
         """
         parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
-        quantities = tuple((name, _quantity(name, each)) for name, each in parameters.items())
+        quantities = tuple(
+            (name, each.of(unknown_parameter(f"{cls.section}.{name}"))) for name, each in parameters.items()
+        )
         signs = [quantity.shown.strip("$") for _, quantity in quantities]
         for name, sign in zip(parameters, signs, strict=True):
             if parameters[name].symbol and signs.count(sign) > 1:
@@ -644,14 +626,3 @@ class EquationSystem(System):
                 value -= step
         is_found = slope != 0 and abs(known - log_factor) <= ROUNDED * max(1.0, abs(log_factor))
         return (name, value, 1 / slope) if is_found else (name, math.nan, math.nan)
-
-
-def _quantity(name: str, stated: StatedParameter) -> Quantity:
-    """The name, the words and the unit of a parameter, as far as they are stated."""
-    plain = unknown_parameter(f"{EquationSystem.section}.{name}")
-    return replace(
-        plain,
-        words=stated.words or plain.words,
-        latex=f"${stated.symbol}$" if stated.symbol else plain.latex,
-        unit=plain.unit if stated.unit == "unknown" else stated.unit,
-    )

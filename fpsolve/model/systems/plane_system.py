@@ -98,8 +98,8 @@ class PlaneSystem(LinearMotion):
                 exp() and sqrt().
             parameters: values by names. One called epsilon is ε, in whose powers all coefficients must be polynomials.
             noises: what the noise is called in the rates, and which section of keys it has; {"xi": "noise"} if None.
-            walls: where the state is reflected, one at most: v⁺ = −R v⁻ at x = 0, R = `restitution` a number or an
-                expression; there ẋ must be c v, c > 0.
+            walls: one reflection at most: v⁺ = −R v⁻ at x = 0, where ẋ must be c v, c > 0. R = `restitution` is a
+                number or an expression.
 
         Raises:
             ValueError: with the place and the term that is not what it must be.
