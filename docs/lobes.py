@@ -33,7 +33,7 @@ def draw(file: str) -> None:
     import matplotlib.pyplot as plt
 
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained", dpi=110)
-    turning = next(iter(load_case("cases/systems/chatter.toml").curves())).problem
+    turning = next(iter(load_case("cases/systems/chatter.toml").sets())).problem
     axes = Axis("system.speed", 0.45, 2.0), Axis("system.w", 0.02, 0.7)
     for colour, s in zip(("#0072B2", "#D55E00"), (0.5, 1.0), strict=True):
         line = boundary(turning.at({"noise.s": s}), "moment(2) = 0", *axes)

@@ -34,7 +34,7 @@ ROOMS = {
     "theory": "what is known in closed form",
     "fem": "meshes and the matrices of the generator",
     "case": "case files",
-    "solve": "what a case asks of each curve becomes numbers",
+    "solve": "what a case asks of each parameter set becomes numbers",
     "results": "numbers become a table and its files",
     "tell": "a table becomes words and pictures",
     "commands": "a file for each command",
@@ -107,14 +107,14 @@ import fpsolve
 
 case = fpsolve.load_case("{path.name}", {_listed(sets)})
 results = fpsolve.run(case)
-{"" if few or not case.method.has_pairs else INDICES}"""
+{"" if few or not case.method.has_pairs else SUMMARY_NUMBERS}"""
     if path.stem in CHARTS:
         return head + shown + CHART.format(file=path.name, name=path.stem)
     return head + shown + run + KINDS.get(path.stem, "")
 
 
-INDICES = """for result in results[:6]:
-    print(dict(result.curve.varied), "lambda =", result.lyapunov_exponent, "delta_p =", result.stability_index)
+SUMMARY_NUMBERS = """for result in results[:6]:
+    print(dict(result.parameter_set.varied), "lambda =", result.lyapunov_exponent, "delta_p =", result.stability_index)
 """
 CHART = """
 # %%

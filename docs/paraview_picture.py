@@ -4,10 +4,10 @@
 
     --collection FILE.pvd                    T(phi, xi) at p = 2 as a surface, saved to eigenfunctions.png
       --p 1 --field tilted_density           another p and field, saved to eigenfunctions-tilted_density.png
-    --collection FOLDER/curves.pvd --p 3     the third curve of several, all at one p
+    --collection FOLDER/sets.pvd --p 3     the third parameter set of several, all at one p
 
 Where there is no display: xvfb-run -a -s -noreset pvpython docs/paraview_picture.py --collection FILE.pvd
-The time of eigenfunctions.pvd is p, that of curves.pvd the number of the curve, or the value of what is varied. Fields
+The time of eigenfunctions.pvd is p, that of sets.pvd the number of the set, or the value of what is varied. Fields
 are divided by their maximum, and shown where a density exceeds 1e-3 of its own. Red lines are impacts, where T jumps.
 """
 

@@ -205,7 +205,7 @@ class Code(Enum):
         "warning: rtol = {rtol:g} is not met at {count} of {of} moments. The worst, p = {p:g}, has an estimated "
         "relative error of {size:.1e}; {remedy}, or accept it by rtol = {size:more1.1}"
     )
-    INDEX_RTOL_MISSED = (
+    NUMBER_RTOL_MISSED = (
         "warning: rtol = {rtol:g} is not met by {symbol}: {value:.6g} has an estimated error of {error:.1e}. Accept it "
         "by rtol = {size:more1.1}, or {remedy:?{remedy}¦use a smaller rtol for a finer mesh}"
     )
@@ -229,9 +229,9 @@ class Code(Enum):
         "errors): {reason}"
     )
 
-    INDEX_FAILED = "failure: fpsolve found no {symbols}: {reason}"
-    INDEX_MISSING = "warning: fpsolve found no {symbols}: {reason}"
-    INDEX_ABSENT = "note: there is no {symbols}: {reason}"
+    NUMBER_FAILED = "failure: fpsolve found no {symbols}: {reason}"
+    NUMBER_MISSING = "warning: fpsolve found no {symbols}: {reason}"
+    NUMBER_ABSENT = "note: there is no {symbols}: {reason}"
     NO_MOMENT = "failure: fpsolve found no Λ({p:g})"
     NOT_DRIVEN = "note: no noise moves the state, so that Λ(p) is λ p and has no other root"
     NO_ROOT = (

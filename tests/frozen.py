@@ -142,12 +142,12 @@ def of_case(path: Path) -> Iterator[Number]:
     """Those of the first set and of the last, at the rtol of the case."""
     case = load_case(path)
     for number in sorted({1, case.planned}):
-        [curve] = case.curves(number - 1, number)
+        [parameter_set] = case.sets(number - 1, number)
         wanted = {-0.5, 1.0, 2.0, 3.5, *(each.p for each in case.expect if each.p is not None)}
-        if not choose(curve.problem).has_pairs:
+        if not choose(parameter_set.problem).has_pairs:
             wanted = {2.0}
-        drawn = (-0.9, 4.0) if curve.problem.dimension == 2 else None
-        for each in of_problem(curve.problem, tuple(sorted(wanted)), drawn):
+        drawn = (-0.9, 4.0) if parameter_set.problem.dimension == 2 else None
+        for each in of_problem(parameter_set.problem, tuple(sorted(wanted)), drawn):
             yield replace(each, rtol=case.rtol, parameters=number)
 
 

@@ -18,14 +18,14 @@ from fpsolve.case import Case
 from fpsolve.cli import main
 from fpsolve.model import CoefficientMatrix, LinearSystem, Noise, System
 from fpsolve.results.known import names_of, read_into, record_of
-from fpsolve.solve import CurveResult, SimulatedCurve, simulation_of
+from fpsolve.solve import SetResult, SimulatedSet, simulation_of
 from fpsolve.solve.question import Job, Numerics
-from fpsolve.solve.sets import everything, result_of, solve_curve
+from fpsolve.solve.sets import everything, result_of, solve_set
 
 ALL = 'output.quantities="all"'
 """Sets what a case asks for to everything."""
-INDICES = '["moment", "lyapunov_exponent", "stability_index", "variance_rate", "impact_rate", "critical_impact_factor"'
-INDICES += ', "critical_restitution", "eigenfunctions"]'
+QUANTITIES = '["moment", "lyapunov_exponent", "stability_index", "variance_rate", "impact_rate"'
+QUANTITIES += ', "critical_impact_factor", "critical_restitution", "eigenfunctions"]'
 """All that is one number, Λ(p), and eigenfunctions."""
 OSCILLATOR = {"epsilon": 0.1, "omega": 1.0, "restitution": 0.8, "c1": 0.1}
 NOISE = {"D0": 0.5, "tau0": 0.5, "r0": 0.95, "treatment": "ou-reduction"}
@@ -49,8 +49,8 @@ p = [2.0, 0.0, -1.0]
 figure = false
 eigenfunctions = [2.0]
 """
-"""Two curves with three p and an eigenfunction."""
-DRAWN = TEXT.replace("figure = false", f"figure = true\nquantities = {INDICES}")
+"""Two parameter sets with three p and an eigenfunction."""
+DRAWN = TEXT.replace("figure = false", f"figure = true\nquantities = {QUANTITIES}")
 """The same with a figure and all that is one number."""
 LEAN = "output={ quantities = ['lyapunov_exponent'] }"
 """Sets what is solved in the least time."""
@@ -63,7 +63,7 @@ COSTLY = (
     "fpsolve.solve.eigenfunctions.densities",
 )
 """What takes more than the tolerance of Λ(p) needs."""
-TABLES = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
+TABLES = {"summary.json", "moments.csv", "sets.csv", "results.nc"}
 """The files of what is solved."""
 
 
@@ -144,28 +144,28 @@ def case_in(folder: Path, text: str, overrides: Sequence[str] = (), name: str = 
 
 
 def solve_sets(case: Case) -> list[Any]:
-    """All that a case wants of its curves, each with its record and its pictures."""
-    jobs = [solve_curve(Job(curve, everything(case), Numerics.of(case))) for curve in case.curves()]
+    """All that a case wants of its parameter sets, each with its record and its pictures."""
+    jobs = [solve_set(Job(parameter_set, everything(case), Numerics.of(case))) for parameter_set in case.sets()]
     return [SimpleNamespace(result=result_of(job), record=record_of(job), pictures=job.pictures) for job in jobs]
 
 
-def solve_case(case: Case) -> list[CurveResult]:
+def solve_case(case: Case) -> list[SetResult]:
     """The numbers alone."""
     return [solved.result for solved in solve_sets(case)]
 
 
-def simulate_curves(case: Case) -> list[SimulatedCurve]:
-    """The simulation of every curve, without a folder."""
+def simulate_sets(case: Case) -> list[SimulatedSet]:
+    """The simulation of every parameter set, without a folder."""
     return [
-        SimulatedCurve(curve, *simulation_of(curve, case.simulated.tolist(), case.monte_carlo))
-        for curve in case.curves()
+        SimulatedSet(parameter_set, *simulation_of(parameter_set, case.simulated.tolist(), case.monte_carlo))
+        for parameter_set in case.sets()
     ]
 
 
-def from_record(case: Case, curve: Any, record: Any) -> CurveResult:
+def from_record(case: Case, parameter_set: Any, record: Any) -> SetResult:
     """A solved set as it comes back from its record."""
     asked, numerics = everything(case), Numerics.of(case)
-    return result_of(read_into(Job(curve, asked, numerics), record, names_of(asked, numerics), is_all=True))
+    return result_of(read_into(Job(parameter_set, asked, numerics), record, names_of(asked, numerics), is_all=True))
 
 
 def read_json(path: Path) -> Any:

@@ -438,7 +438,7 @@ DEFECTS: tuple[Defect, ...] = (
         "cubic",
     ),
     Defect(
-        "R28 an index that needs one ray is reported as missing",
+        "R28 a summary number that needs one ray is reported as missing",
         "solve/sets.py",
         "if job.numerics.is_stated or not message.tells_of",
         "if job.numerics.is_stated or message.tells_of",

@@ -45,7 +45,7 @@ COMMANDS = [
 OPTIONAL = [
     ["prove", "minimal.toml", "--width", "1e-4"],
 ]
-WRITTEN = ["summary.json", "curves.csv", "results.nc", "figure.pdf", "curves.pvd", "report.html"]
+WRITTEN = ["summary.json", "sets.csv", "results.nc", "figure.pdf", "sets.pvd", "report.html"]
 
 
 class Failed(Exception):

@@ -70,7 +70,7 @@ class Sensitivities(Result):
         quantities: what the parameters are.
         p: the moments, shape (n,).
         moments: ∂Λ(p)/∂θ, one mapping for each p; empty where Λ(p) did not converge.
-        indices: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate"; without those that do not exist.
+        summary_numbers: ∂/∂θ of "lyapunov_exponent", "stability_index" and "variance_rate", of those that exist.
         notes: what is one-sided, and what is missing, and why.
     """
 
@@ -78,13 +78,13 @@ class Sensitivities(Result):
     quantities: Mapping[str, Quantity]
     p: FloatArray
     moments: tuple[Slopes, ...]
-    indices: Mapping[str, Slopes]
+    summary_numbers: Mapping[str, Slopes]
     notes: tuple[Message, ...] = ()
 
     def to_xarray(self) -> xarray.Dataset:
         """The derivatives over p and θ, and their errors; NaN where there is none."""
         numbers = {}
-        single = [(RECORDS[name], (self.indices[name],)) for name in RECORDS if name in self.indices]
+        single = [(RECORDS[name], (self.summary_numbers[name],)) for name in RECORDS if name in self.summary_numbers]
         for record, rows in [(MOMENT, self.moments), *single]:
             slope = record.by(THETA)
             for quantity, of in ((slope, "value"), (slope.error(), "error_estimate")):
@@ -105,7 +105,7 @@ class Sensitivities(Result):
         """By their symbols λ, as p = 0, and Λ of some p, each with its derivatives: the numbers of pictures."""
         rows = [(float(p), slopes) for p, slopes in zip(self.p, self.moments, strict=True) if p and slopes]
         chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_BARS)).round().astype(int))
-        exponent = self.indices.get(LYAPUNOV_EXPONENT.name)
+        exponent = self.summary_numbers.get(LYAPUNOV_EXPONENT.name)
         first = {LYAPUNOV_EXPONENT.latex: (0.0, exponent)} if exponent else {}
         return first | {moment_at(rows[i][0]).latex: rows[i] for i in chosen}
 
@@ -120,7 +120,7 @@ class Sensitivities(Result):
             axes.legend()
 
     def _said(self) -> str:
-        what = [*self.indices, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]
+        what = [*self.summary_numbers, *[f"Λ({p:g})" for p in self.p[:1]], *["..."] * (self.p.size > 1)]
         return f"of {', '.join(what) or 'nothing'} by {len(self.theta)} parameters"
 
 
@@ -152,8 +152,10 @@ def sensitivities(
     """
     solver = solver_of(problem, mesh, rtol, budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    indices = tuple(RECORDS) if solver.method.has_pairs else ()
-    return solve_sensitivities(solver, points, problem.derivatives(), indices=indices, progress=progress)
+    summary_numbers = tuple(RECORDS) if solver.method.has_pairs else ()
+    return solve_sensitivities(
+        solver, points, problem.derivatives(), summary_numbers=summary_numbers, progress=progress
+    )
 
 
 def solve_sensitivities(
@@ -161,7 +163,7 @@ def solve_sensitivities(
     p: FloatArray,
     along: Mapping[str, ParameterDerivative],
     *,
-    indices: Iterable[str],
+    summary_numbers: Iterable[str],
     progress: Callable[[], None] = lambda: None,
 ) -> Sensitivities:
     """The sensitivities of a solver's problem along some directions.
@@ -170,8 +172,8 @@ def solve_sensitivities(
         solver: of the problem.
         p: the moments, shape (n,), for which Λ is finite.
         along: the directions, by name.
-        indices: those wanted.
-        progress: called once for each p and each index, also where it fails.
+        summary_numbers: those wanted.
+        progress: called once for each p and each summary number, also where it fails.
     """
     problem, parameters = solver.problem, solver.problem.parameters
     notes = [Message(Code.NO_DERIVATIVE, key=key, value=value) for key, value in problem.undifferentiable.items()]
@@ -197,7 +199,7 @@ def solve_sensitivities(
 
     moments = tuple(tried(moment_at(each), partial(found.moment, each), each) for each in p.tolist())
     solves: Any = dict(zip(RECORDS, (partial(found.ratio, 0.0), found.root, found.variance_rate), strict=True))
-    slopes = {name: tried(RECORDS[name], solves[name]) for name in indices}
+    slopes = {name: tried(RECORDS[name], solves[name]) for name in summary_numbers}
     values = problem.values
     noises = zip([*problem.sections][1:], problem.noise.parts.values(), strict=True)
     keys = [f"{section}.{name}" for section, noise in noises for name in noise.one_sided]
@@ -207,7 +209,7 @@ def solve_sensitivities(
         quantities={key: parameters[key].quantity for key in along},
         p=p,
         moments=moments,
-        indices={name: each for name, each in slopes.items() if each},
+        summary_numbers={name: each for name, each in slopes.items() if each},
         notes=(*notes, *one_sided),
     )
 

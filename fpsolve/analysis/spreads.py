@@ -27,7 +27,7 @@ from fpsolve.data import Result, dataset
 from fpsolve.errors import NotConverged
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.method import Budget, checked_moments
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import SUMMARY_NUMBERS
 from fpsolve.exponent.solver import solver_of
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX, P
@@ -189,31 +189,32 @@ class Uncertainty(Result):
         laws: of the uncertain parameters, by their keys.
         p: the moments, shape (n,).
         moments: the spread of each Λ(p); None where its derivatives were not solved.
-        indices: the spreads of "lyapunov_exponent" and "stability_index", where these exist.
+        summary_numbers: the spreads of "lyapunov_exponent" and "stability_index", where these exist.
         sensitivities: the derivatives by which the spreads are found.
     """
 
     laws: Mapping[str, Law]
     p: FloatArray
     moments: tuple[Spread | None, ...]
-    indices: Mapping[str, Spread]
+    summary_numbers: Mapping[str, Spread]
     sensitivities: Sensitivities
 
     def to_xarray(self) -> xarray.Dataset:
         """The values, and the ends of their intervals."""
         numbers = {}
-        rows = [(RECORDS[name], [spread]) for name, spread in self.indices.items()]
+        rows = [(RECORDS[name], [spread]) for name, spread in self.summary_numbers.items()]
         for quantity, spreads in [(MOMENT, self.moments), *rows]:
             ends = {which: quantity.end(which, LEVEL) for which in ("low", "high")}
             for part, record in {"value": quantity, **ends}.items():
                 column = np.array([math.nan if each is None else getattr(each, part) for each in spreads])
                 numbers[record] = column if quantity.dims else column[0]
-        held = self.sensitivities.theta
-        return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, held, level=LEVEL)
+        fixed = self.sensitivities.theta
+        return dataset("uncertainty to first order", "finite elements", numbers, {P: self.p}, fixed, level=LEVEL)
 
     def _said(self) -> str:
         parts = [
-            f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}" for name, each in self.indices.items()
+            f"{RECORDS[name].symbol} from {each.low:.4g} to {each.high:.4g}"
+            for name, each in self.summary_numbers.items()
         ]
         return f"with {LEVEL:.0%}: {', '.join(parts) or f'{self.p.size} p'}"
 
@@ -243,18 +244,18 @@ def uncertainty(
     laws = laws_of(problem, uncertain)
     solver = solver_of(problem, rtol=rtol, budget=budget)
     points = checked_moments(p, solver.method, may_be_empty=True)
-    indices = UNCERTAIN if solver.method.has_pairs else ()
-    found = {name: each for name in indices if (each := INDICES[name].solve(solver))}
+    summary_numbers = UNCERTAIN if solver.method.has_pairs else ()
+    found = {name: each for name in summary_numbers if (each := SUMMARY_NUMBERS[name].solve(solver))}
     along = {key: problem.derivative(key) for key in laws}
-    slopes = solve_sensitivities(solver, points, along, indices=[*found])
+    slopes = solve_sensitivities(solver, points, along, summary_numbers=[*found])
     solved = solver.moments(points)
     if solved.failures:
         raise NotConverged(solved.failures[0].reason)
-    spreads = {name: spread_of(each.value, slopes.indices.get(name, {}), laws) for name, each in found.items()}
+    spreads = {name: spread_of(each.value, slopes.summary_numbers.get(name, {}), laws) for name, each in found.items()}
     return Uncertainty(
         laws=laws,
         p=points,
         moments=tuple(map(spread_of, solved.value.tolist(), slopes.moments, repeat(laws))),
-        indices={name: each for name, each in spreads.items() if each is not None},
+        summary_numbers={name: each for name, each in spreads.items() if each is not None},
         sensitivities=slopes,
     )

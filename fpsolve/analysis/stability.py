@@ -230,14 +230,14 @@ class Boundary(Result):
             POINTS["branch"]: numbers,
             POINTS["label"]: np.array([label for branch in branches for label in branch.labels], dtype=str),
         }
-        held = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
+        fixed = {key: value for key, value in self.problem.values.items() if key not in (self.x.key, self.y.key)}
         closed = ", ".join(str(number) for number, branch in enumerate(branches, start=1) if branch.closed)
         found = dataset(
             "line of stability",
             "finite elements",
             variables,
             coordinates,
-            held,
+            fixed,
             line=self.target.equation,
             closed_branches=closed,
             remark=self.remark(),
@@ -329,7 +329,7 @@ def boundary(
     Boundary(λ = 0: 1 branch over oscillator.c1 and noise.sigma)
 
     Args:
-        problem: a motion and its noise, whose other parameters are held.
+        problem: a motion and its noise, whose other parameters are fixed.
         target: such as "lyapunov_exponent = 0", "moment(2) = 0" or "stability_index = -1".
         x, y: the frame.
         step: the longest step between two points, in sides of the frame; 0.02 if omitted, or 0.05 if F needs

@@ -1,4 +1,4 @@
-"""A case file: TOML in, a validated `Case` of one or many `Curve`s out, or one message for each fault of the file."""
+"""A case file: TOML in, a validated `Case` of `ParameterSet`s out, or one message for each fault of the file."""
 
 from __future__ import annotations
 
@@ -85,18 +85,18 @@ CHEAP = (MOMENT.name, LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name)
 CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
 """What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
-"""Of so many curves at most the response is computed unasked, and densities of it are written."""
+"""Of so many parameter sets at most the response is computed unasked, and densities of it are written."""
 USUAL_P = 2.0
 
 
 @dataclass(frozen=True)
-class Curve:
+class ParameterSet:
     """One parameter set of a case; its problem is made when it is asked for, which may raise `ValueError`.
 
     Attributes:
         base: the problem of the case, without what is varied.
         varied: the parameters that [vary] names, by their dotted keys, such as "noise.D0".
-        number: its place among the curves of its case, from 1 on.
+        number: its place among the parameter sets of its case, from 1 on.
     """
 
     base: Problem
@@ -139,20 +139,20 @@ class Curve:
 
     @property
     def of(self) -> str:
-        """Which of the curves, after a title: ", noise.D0 = 0.1"."""
+        """Which of the parameter sets, after a title: ", noise.D0 = 0.1"."""
         return f", {self.label}" if self.varied else ""
 
     @property
     def suffix(self) -> str:
-        """What the names of its files end in: nothing for the first curve, "-2" for the second."""
+        """What the names of its files end in: nothing for the first parameter set, "-2" for the second."""
         return "" if self.number == 1 else f"-{self.number}"
 
-    def held(self, time_unit: str, varied: Collection[str] = ()) -> list[str]:
+    def fixed(self, time_unit: str, varied: Collection[str] = ()) -> list[str]:
         """The parameters but the varied ones in words, without the nonlinear ones that are 0, for a figure."""
         known, linear = self.problem.parameters, self.problem.differentiable
         left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
-        held = {key: value for key, value in self.parameters.items() if key not in left}
-        return [known[key].quantity.timed(time_unit).stated(value) for key, value in held.items()]
+        fixed = {key: value for key, value in self.parameters.items() if key not in left}
+        return [known[key].quantity.timed(time_unit).stated(value) for key, value in fixed.items()]
 
 
 class Case(Section):
@@ -186,7 +186,7 @@ class Case(Section):
     vary: Annotated[
         InstanceOf[Vary],
         BeforeValidator(vary_of, json_schema_input_type=VarySection),
-        parameter("the parameter sets, with a curve for each", EXAMPLE),
+        parameter("the parameter sets", EXAMPLE),
     ] = Vary()
     mesh: Annotated[MeshSection, parameter("a mesh, instead of one that is chosen", "[mesh]")] = MeshSection()
     monte_carlo: Annotated[MonteCarloSection, parameter("how the system is simulated", "[monte_carlo]")] = (
@@ -270,7 +270,7 @@ class Case(Section):
 
     @cached_property
     def available(self) -> tuple[str, ...]:
-        """The names of what there is of this case; the response if some of the first curves have one."""
+        """The names of what there is of this case; the response if some of the first parameter sets have one."""
         if not self.method.has_pairs:
             return MOMENT.name, SENSITIVITIES
         is_there = dict.fromkeys(OF_IMPACTS, bool(self.problem.linear.jumps))
@@ -306,7 +306,7 @@ class Case(Section):
     @property
     def shown(self) -> FloatArray:
         """The p whose eigenfunctions are written: those of [output]; where that names none, at most nine, evenly
-        spread, of more than two variables at most three; unasked that next to 2, of the first curve alone.
+        spread, of more than two variables at most three; unasked that next to 2, of the first parameter set alone.
         """
         wanted = self.output.eigenfunctions
         if EIGENFUNCTIONS not in self.asked or self.method.no_picture:
@@ -319,18 +319,18 @@ class Case(Section):
 
     @property
     def usual_p(self) -> float:
-        """The p at which curves are compared by their eigenfunctions: of those that are shown, or of all, next to 2."""
+        """The p at which sets are compared by their eigenfunctions: of those that are shown, or of all, next to 2."""
         return float(min(self.shown if self.shown.size else self.p, key=lambda p: abs(p - USUAL_P), default=USUAL_P))
 
     @property
     def leaves_out_response(self) -> bool:
-        """Whether no response is computed, as there are too many curves and nobody names it."""
+        """Whether no response is computed, as there are too many parameter sets and nobody names it."""
         return self.output.names is None and self.responds and RESPONSE not in self.asked
 
     @cached_property
     def responds(self) -> bool:
-        """Whether some of the first curves have a response, and it is not left out."""
-        nonlinear = (each.is_possible and each.problem.linear.responds for each in self.curves(0, MOST_DRAWN))
+        """Whether some of the first parameter sets have a response, and it is not left out."""
+        nonlinear = (each.is_possible and each.problem.linear.responds for each in self.sets(0, MOST_DRAWN))
         return not self.response.off and any(nonlinear)
 
     @property
@@ -347,23 +347,23 @@ class Case(Section):
 
     @property
     def planned(self) -> int:
-        """How many curves there are, without making them."""
+        """How many parameter sets there are, without making them."""
         return len(self.vary)
 
     @property
-    def constants(self) -> Varied:
+    def fixed(self) -> Varied:
         """The values of the parameters that are not varied, by their keys."""
-        [first] = self.curves(0, 1)
+        [first] = self.sets(0, 1)
         return {key: value for key, value in first.parameters.items() if key not in self.vary.keys}
 
-    def curves(self, start: int = 0, stop: int | None = None) -> Iterator[Curve]:
-        """One curve for each set of the varied values, from one place to another; each is made when it is asked for."""
+    def sets(self, start: int = 0, stop: int | None = None) -> Iterator[ParameterSet]:
+        """Its parameter sets, from one place to another; each is made when it is asked for."""
         sets = enumerate(self.vary.sets[start:stop], start + 1)
-        return (Curve(self.problem, varied, number) for number, varied in sets)
+        return (ParameterSet(self.problem, varied, number) for number, varied in sets)
 
-    def curve(self, varied: Varied) -> Curve:
+    def parameter_set(self, varied: Varied) -> ParameterSet:
         """The case's parameter set with some parameters replaced, by their dotted keys."""
-        return Curve(self.problem, varied)
+        return ParameterSet(self.problem, varied)
 
     @property
     def headline(self) -> str:
@@ -377,15 +377,15 @@ class Case(Section):
 
     @cached_property
     def theory_reduces_noise(self) -> bool:
-        """Whether perturbation theory takes the reduction in place of the noise of some curve."""
+        """Whether perturbation theory takes the reduction in place of the noise of some parameter set."""
         texts = [key for key in self.vary.keys if self.vary.is_text(key)]
         words = {tuple(map(each.__getitem__, texts)) for each in self.vary.sets}
-        kinds = (self.curve(dict(zip(texts, each, strict=True))) for each in words)
+        kinds = (self.parameter_set(dict(zip(texts, each, strict=True))) for each in words)
         return any(each.is_possible and each.noise.approximates_spectrum for each in kinds)
 
-    def heading(self, curve: Curve) -> str:
-        """The headline, with which of the curves."""
-        return self._with_changes(f"{self.title}: {curve.label}" if curve.varied else self.title)
+    def heading(self, parameter_set: ParameterSet) -> str:
+        """The headline, with which of the parameter sets."""
+        return self._with_changes(f"{self.title}: {parameter_set.label}" if parameter_set.varied else self.title)
 
     def _with_changes(self, title: str) -> str:
         split = [map(str.strip, text.split("=", 1)) for text in self._overrides]

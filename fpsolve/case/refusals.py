@@ -30,18 +30,18 @@ from fpsolve.case.sections import (
 )
 from fpsolve.case.vary import Vary, assignments, map_key
 from fpsolve.exponent.kinds import choose
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import SUMMARY_NUMBERS
 from fpsolve.model.faults import nearest, quoted, shown
 from fpsolve.model.parameters import Section
 from fpsolve.model.problem import Problem
 from fpsolve.theory.perturbation import second_order_or_none
 
 Known = Mapping[str, Any]
-MAX_CURVES = 100_000
+MAX_SETS = 100_000
 
 
 def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refusal]:
-    """One of the first curve; where keys are varied each has those that exist, but even ones alone are so for all."""
+    """One of the first set; where keys are varied each has those that exist, but even ones alone are so for all."""
     if problem := problem_of(valid):
         method = choose(problem)
         is_told = method.is_computed and not (context.get("varies") and method.has_pairs)
@@ -50,10 +50,10 @@ def _of_moments(moments: Moments, valid: Known, context: Known) -> Iterator[Refu
 
 
 def _of_vary(vary: Vary, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Too many curves, or a first one that cannot be solved; the others are told of when they are solved."""
+    """Too many parameter sets, or a first one that cannot be solved; the others are told of when they are solved."""
     problem, moments = problem_of(valid), valid.get("moments")
-    if len(vary) > MAX_CURVES:
-        yield (), f"makes {len(vary)} parameter sets; must be at most {MAX_CURVES}; list fewer values"
+    if len(vary) > MAX_SETS:
+        yield (), f"makes {len(vary)} parameter sets; must be at most {MAX_SETS}; list fewer values"
     elif problem and moments and (text := obstacle(problem, vary.sets[0], moments.values, with_moments=False)):
         yield ("file",) if vary.file else (), vary.line_of(1) + _with(vary.sets[0]) + text
 
@@ -63,7 +63,7 @@ def _with(varied: Varied) -> str:
 
 
 def obstacle(base: Problem, varied: Varied, p: FloatArray, *, with_moments: bool = True) -> str:
-    """Why there is no such curve, or why some Λ(p) of it is not computed, or nothing."""
+    """Why there is no such parameter set, or why some Λ(p) of it is not computed, or nothing."""
     extremes = [float(p.max()), float(p.min())] if p.size else []
     try:
         problem = base.at(varied)
@@ -114,8 +114,8 @@ def _of_output(output: OutputSection, valid: Known, context: Known) -> Iterator[
     """Eigenfunctions at p that are not among the moments, a figure of what is not computed, and what is none."""
     problem = problem_of(valid)
     if problem and output.lists_quantities:
-        for name in {*(output.names or ())} & INDICES.keys():
-            if told := choose(problem).reason(0.0, INDICES[name].symbol):
+        for name in {*(output.names or ())} & SUMMARY_NUMBERS.keys():
+            if told := choose(problem).reason(0.0, SUMMARY_NUMBERS[name].symbol):
                 yield ("quantities",), told
     wanted = ((("eigenfunctions", i), p) for i, p in enumerate(output.eigenfunctions or ()))
     yield from _of_orders(valid, wanted, f"choose one of them, {_without('output.eigenfunctions')}")
@@ -157,7 +157,7 @@ def _of_expect(expect: tuple[Expectation, ...], valid: Known, context: Known) ->
 
 
 def _of_excursions(section: ExcursionSection, valid: Known, context: Known) -> Iterator[Refusal]:
-    """Excursions that are not computed, or a start that the noise of the first curve does not have."""
+    """Excursions that are not computed, or a start that the noise of the first parameter set does not have."""
     yield from _unwanted(EXCURSIONS, section, valid)
     problem, vary = problem_of(valid), valid.get("vary", Vary())
     if problem is None or section.xi == STATIONARY:

@@ -37,7 +37,7 @@ from fpsolve.case.explain import (
 from fpsolve.case.keys import leaves
 from fpsolve.drawing import is_math
 from fpsolve.exponent.method import RTOL, RTOL_BEYOND_PLANE, RTOL_OF_SEVERAL, RTOLS
-from fpsolve.exponent.quantities import INDICES, MOMENT, QUANTITIES, DrawnName, QuantityName
+from fpsolve.exponent.quantities import MOMENT, QUANTITIES, SUMMARY_NUMBERS, DrawnName, QuantityName
 from fpsolve.fem.mesh import MAX_CELLS, MAX_DEGREE
 from fpsolve.messages import is_control
 from fpsolve.model.faults import shown
@@ -58,7 +58,7 @@ OF_MOMENTS = DERIVATIVE.name, RATE_FUNCTION.name
 """What follows from Λ(p)."""
 PARTS: tuple[str, ...] = EXCURSIONS, RESPONSE, SENSITIVITIES, EIGENFUNCTIONS
 """What else may be asked for: the names of files of `fpsolve/solve`, each with a question, in the order of work."""
-QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *INDICES, *PARTS)
+QUANTITY_NAMES = (MOMENT.name, *OF_MOMENTS, *SUMMARY_NUMBERS, *PARTS)
 """What may be asked for."""
 EVERYTHING = "all"
 """What stands for all of these."""
@@ -80,7 +80,7 @@ _LINES = 'lines = ["lyapunov_exponent = 0", "moment(2) = 0"]'
 Values = tuple[float, ...]
 Value = float | str
 Varied = Mapping[str, Value]
-"""The values of the varied keys on one curve."""
+"""The values of the varied keys of one parameter set."""
 NonEmpty = Annotated[Values, Field(strict=False, min_length=1, max_length=MAX_MOMENTS)]
 Cells = Annotated[int | None, Field(ge=1, le=MAX_CELLS)]
 Degree = Annotated[int | None, Field(ge=1, le=MAX_DEGREE)]
@@ -223,7 +223,7 @@ OPEN = STRICT | ConfigDict(extra="allow")
 
 
 class VarySection(BaseModel):
-    """One curve for each parameter set: the values of keys, with quotes and dots or in tables; or a file of sets."""
+    """The parameter sets: the values of keys, with quotes and dots or in tables; or a file of sets."""
 
     model_config = OPEN
     __pydantic_extra__: dict[str, _Column | dict[str, _Column | dict[str, Any]]]
@@ -530,7 +530,7 @@ class ResponseSection(Section):
 
 
 class Expectation(Section):
-    """[[expect]]: a value that the result must have, on the curves that `where` selects."""
+    """[[expect]]: a value that the result must have, on the parameter sets that `where` selects."""
 
     quantity: Annotated[
         ExpectedName, parameter("what is checked; also response.energy and the like", 'quantity = "moment"')
@@ -556,7 +556,7 @@ class Expectation(Section):
         return name if section == RESPONSE else ""
 
     def selects(self, varied: Varied) -> bool:
-        """Whether this is about the curve with these varied values; without `where`, about all curves."""
+        """Whether this is about the parameter set with these varied values; without `where`, about all sets."""
         return all(same(varied[key], value) for key, value in self.where.items())
 
     @model_validator(mode="after")

@@ -64,7 +64,7 @@ class Vary:
         return tuple(dict(zip(self.columns, row, strict=True)) for row in rows)
 
     def line_of(self, number: int) -> str:
-        """The line of its file on which the set of a curve stands, as "sets.csv:12: "; empty where there is no file."""
+        """The line of its file on which a parameter set stands, as "sets.csv:12: "; empty where there is no file."""
         return f"{self.file}:{self.lines[number - 1]}: " if self.file else ""
 
     def crossing(self, key: str) -> str | None:

@@ -16,7 +16,7 @@ import numpy as np
 from fpsolve.arrays import require
 from fpsolve.case.case import Case, load_case
 from fpsolve.case.sections import RESPONSE
-from fpsolve.commands.options import kept, of_curves, saying_if_interrupted
+from fpsolve.commands.options import kept, of_sets, saying_if_interrupted
 from fpsolve.commands.simulate import Simulations
 from fpsolve.errors import FpsolveError, NotConverged, WorkersDied
 from fpsolve.files import writable, write_bytes
@@ -24,16 +24,16 @@ from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
 from fpsolve.pool import SERIAL, Pool, cluster, parallel
 from fpsolve.results.csv_json import GROWING, TABLES, Content, Writer, facts_of
-from fpsolve.results.eigenfunctions import FILES, write_curves
+from fpsolve.results.eigenfunctions import FILES, write_sets
 from fpsolve.results.folders import own_folder
 from fpsolve.results.known import Results, record_of
 from fpsolve.results.simulate import SIMULATION, write_response
 from fpsolve.results.table import COUNTS
-from fpsolve.solve.curve import CurveResult, Status
 from fpsolve.solve.question import Job, idle, refuse_mesh
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records
-from fpsolve.solve.sets import solve_set
+from fpsolve.solve.set_result import SetResult, Status
+from fpsolve.solve.sets import attempt_set
 from fpsolve.solve.simulate import refuse_obstacles
 from fpsolve.tell import solved as told
 from fpsolve.tell.notes import MONTE_CARLO, notes
@@ -65,7 +65,7 @@ class Solved:
 def solved(job: Job) -> Solved:
     """The task: solves a set and draws its pictures; where it is interrupted, what is done by then."""
     try:
-        solve_set(job)
+        attempt_set(job)
         return Solved(record_of(job), contents_of(job))
     except KeyboardInterrupt:
         return Solved(record_of(job), {}, interrupted=True)
@@ -78,7 +78,7 @@ def contents_of(job: Job) -> dict[str, bytes]:
     with TemporaryDirectory() as place:
         folder = Path(place)
         for name, found in job.pictures.items():
-            FILES[name](found, job.curve, folder)
+            FILES[name](found, job.parameter_set, folder)
         files = (path for path in sorted(folder.rglob("*")) if path.is_file())
         return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
@@ -113,7 +113,7 @@ class Sweep:
 
         def done() -> str:
             whole = len(results.whole)
-            return kept(whole, of_curves(case), self.folder, is_more=len(results) > whole)
+            return kept(whole, of_sets(case), self.folder, is_more=len(results) > whole)
 
         with saying_if_interrupted(done), writable(self.folder):
             try:
@@ -160,13 +160,13 @@ class Sweep:
 
     def _grow(self, job: Job) -> None:
         """Keep what is known of the only set, and show it in the tables; once it is solved, only pictures are drawn."""
-        if job.curve.number not in self.results.whole:
-            self.results.put(job.curve, record_of(job))
+        if job.parameter_set.number not in self.results.whole:
+            self.results.put(job.parameter_set, record_of(job))
             self._write_if_due()
 
     def _take(self, job: Job, done: Solved) -> bool:
         """Keep what became of a set, and its pictures; whether it has failed."""
-        is_failed = bool(done.record) and self.results.put(job.curve, done.record).status.fails
+        is_failed = bool(done.record) and self.results.put(job.parameter_set, done.record).status.fails
         for name, content in done.files.items():
             write_bytes(self.folder / name, content)
         return is_failed
@@ -183,12 +183,12 @@ class Sweep:
         self._due = monotonic() + REST * (monotonic() - started)
 
     def _write_all(self) -> None:
-        """Write all tables, the series over the curves, and the files of what records hold."""
+        """Write all tables, the series over the parameter sets, and the files of what records hold."""
         self._write(TABLES)
-        write_curves(self.case, self.folder)
+        write_sets(self.case, self.folder)
         for result in self.results if RESPONSE in self.results.asked[0] else ():
             if result.response:
-                write_response(result.response, result.curve, self.folder)
+                write_response(result.response, result.parameter_set, self.folder)
 
     @property
     def failed(self) -> int:
@@ -209,7 +209,7 @@ class Outcome:
 
     Attributes:
         sweep: its sets, solved.
-        simulations: its curves, simulated; none where that was not asked for.
+        simulations: its parameter sets, simulated; none where that was not asked for.
     """
 
     sweep: Sweep
@@ -224,14 +224,14 @@ def run(
     scheduler: str = "",
     fresh: bool = False,
     progress: Callable[[], None] = lambda: None,
-) -> tuple[CurveResult, ...]:
+) -> tuple[SetResult, ...]:
     """Solve a case, write `out`/<name of the case>/, and return a result for each parameter set.
 
     A run does not repeat sets that an earlier run finished there. Each run rewrites all files, and removes those of a
     simulation of other parameters. `complete` in results.nc says whether all sets are there.
 
     >>> run("minimal.toml")  # a case of `fpsolve new minimal`
-    (CurveResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
+    (SetResult(converged, 3 p, λ = -1.4456...e-05 ± ...),)
 
     Args:
         case: a case file, or what `load_case` made of it.
@@ -283,8 +283,8 @@ def run_case(
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: a curve cannot be simulated, or only that; nothing is solved.
-        KeyboardInterrupt: a curve was being solved, or nothing was simulated yet; its text says what is kept.
+        FpsolveError: a parameter set cannot be simulated, or only that; nothing is solved.
+        KeyboardInterrupt: a parameter set was being solved, or nothing was simulated yet; its text says what is kept.
     """
     refuse_no_numbers(case, monte_carlo=monte_carlo)
     folder, simulations = Path(out) / case.name, Simulations(case)

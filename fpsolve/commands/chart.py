@@ -64,7 +64,7 @@ def chart_case(
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: the case has no chart, or several curves; nothing is written.
+        FpsolveError: the case has no chart, or several parameter sets; nothing is written.
         KeyboardInterrupt: its text says what is kept; the figure shows that.
     """
     refuse_no_chart(case)

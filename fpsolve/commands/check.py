@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.commands.errors import CHECK_FAILED, NOT_CONVERGED
 from fpsolve.commands.options import (
     ANEW,
@@ -18,7 +18,7 @@ from fpsolve.commands.options import (
     Options,
     Workers,
     kept,
-    of_curves,
+    of_sets,
     on_cases,
     saying_if_interrupted,
 )
@@ -33,9 +33,9 @@ from fpsolve.solve.check import (
     expected,
     refuse_no_hierarchy,
 )
-from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.moments import QUESTION as MOMENTS
 from fpsolve.solve.question import Job, Numerics, refuse_mesh
+from fpsolve.solve.set_result import SetResult
 from fpsolve.tell.check import agreement, show
 from fpsolve.tell.notes import notes
 from fpsolve.tell.progress import SETS, SILENT, Phase, Watch
@@ -47,23 +47,23 @@ def check_case(case: Case, *, by_hierarchy: bool = False, pool: Pool = SERIAL, w
 
     With `by_hierarchy` Λ of its even p is compared with the moment hierarchy.
     """
-    found: list[CurveResult] = []
+    found: list[SetResult] = []
     numerics = replace(Numerics.of(case), is_stated=True)
 
-    def job(curve: Curve) -> Job:
+    def job(parameter_set: ParameterSet) -> Job:
         even = {MOMENTS.name: {"p": even_moments(case).tolist(), "slopes": True}}
-        asked = even if by_hierarchy else expected(case, curve.varied)
-        return Job(curve, asked, numerics, case.vary.line_of(curve.number))
+        asked = even if by_hierarchy else expected(case, parameter_set.varied)
+        return Job(parameter_set, asked, numerics, case.vary.line_of(parameter_set.number))
 
     with (
-        saying_if_interrupted(lambda: kept(len(found), of_curves(case)), ANEW),
+        saying_if_interrupted(lambda: kept(len(found), of_sets(case)), ANEW),
         watch.bar(Phase(case.name, "solving", case.planned, SETS)) as progress,
         pool,
     ):
-        for _, result in pool.run(compared, map(job, case.curves())):
+        for _, result in pool.run(compared, map(job, case.sets())):
             found.append(result)
             progress(failed=result.status.fails)
-    found.sort(key=lambda result: result.curve.number)
+    found.sort(key=lambda result: result.parameter_set.number)
     comparisons = compare_with_hierarchy(case, found) if by_hierarchy else compare(case, found)
     return Checked(found, comparisons)
 

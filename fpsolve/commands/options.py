@@ -220,6 +220,6 @@ def kept(done: int, of: str, folder: Path | None = None, *, is_more: bool = Fals
     return f" after {done} {of}" + (f"; what was done is kept in {folder}" if (done or is_more) and folder else "")
 
 
-def of_curves(case: Case) -> str:
+def of_sets(case: Case) -> str:
     """What is counted of a case: "of 3 parameter sets"."""
     return f"of {case.planned} parameter set{'s' if case.planned > 1 else ''}"

@@ -27,14 +27,14 @@ from fpsolve.errors import FpsolveError
 from fpsolve.files import writable, write_text
 from fpsolve.messages import escaped
 from fpsolve.pool import SERIAL, Pool
-from fpsolve.proofs.claims import Claims, CurveClaims, IndexBound, bound_of, moment_of
-from fpsolve.proofs.questions import IndexEnclosure
+from fpsolve.proofs.claims import Claims, SetClaims, StabilityIndexBound, bound_of, moment_of
+from fpsolve.proofs.questions import StabilityIndexEnclosure
 from fpsolve.results.folders import own_folder
 from fpsolve.solve.prove import (
     PROVEN_BOUNDS,
     PROVEN_RECORDS,
     Answer,
-    CurveProof,
+    SetProof,
     asked_of,
     check_proof,
     gathered,
@@ -61,20 +61,20 @@ def prove_case(
     width: float | None = None,
     pool: Pool = SERIAL,
     watch: Watch = SILENT,
-) -> list[CurveProof]:
-    """Prove bounds on Λ at every p of every curve, and on λ and δ_p; write proof.json into `out`/<case>/.
+) -> list[SetProof]:
+    """Prove bounds on Λ at every p of every parameter set, and on λ and δ_p; write proof.json into `out`/<case>/.
 
     Args:
         width: wanted upper − lower; 1e-7 of the scale of each number if None.
         pool: who proves.
 
     Raises:
-        FpsolveError: a curve cannot be proven, or the width is none; nothing is written.
+        FpsolveError: a parameter set cannot be proven, or the width is none; nothing is written.
         OutputError: the folder cannot be made or written to, or another run writes into it.
         KeyboardInterrupt: its text says what is kept.
     """
     refuse_unprovable_case(case, width)
-    answers, proofs, total = list[Answer](), list[CurveProof](), len(asked_of(case)) * case.planned
+    answers, proofs, total = list[Answer](), list[SetProof](), len(asked_of(case)) * case.planned
     folder, started = Path(out) / case.name, datetime.now(UTC)
 
     def finish() -> None:
@@ -102,26 +102,26 @@ def prove_case(
     return proofs
 
 
-def write_proof(case: Case, proofs: Sequence[CurveProof], folder: Path, *, is_whole: bool) -> None:
-    """proof.json: for each curve its parameters, and every bound with the certificate from which it follows."""
-    curves = [
-        CurveClaims(
-            parameters=dict(proof.curve.parameters),
+def write_proof(case: Case, proofs: Sequence[SetProof], folder: Path, *, is_whole: bool) -> None:
+    """proof.json: for each parameter set its parameters, and every bound with the certificate from which it follows."""
+    sets = [
+        SetClaims(
+            parameters=dict(proof.parameter_set.parameters),
             moments=[moment_of(p, found) for p, found in proof.moments],
             lyapunov_exponent=bound_of(proof.exponent) if proof.exponent else None,
-            stability_index=_index(proof.index) if proof.index else None,
+            stability_index=_index(proof.stability_index) if proof.stability_index else None,
             verdicts=proof.verdicts,
         )
         for proof in proofs
     ]
-    claims = Claims(fpsolve=__version__, case=case.name, complete=is_whole, curves=curves)
+    claims = Claims(fpsolve=__version__, case=case.name, complete=is_whole, sets=sets)
     write_text(folder / PROOF, claims.model_dump_json(indent=1) + "\n")
 
 
-def _index(found: IndexEnclosure) -> IndexBound:
+def _index(found: StabilityIndexEnclosure) -> StabilityIndexBound:
     """Bounds on δ_p, and Λ at two p beside it."""
     lower, upper = (found.lower, found.upper) if found.is_proven else (None, None)
-    return IndexBound(lower=lower, upper=upper, moments=[moment_of(p, each) for p, each in found.moments])
+    return StabilityIndexBound(lower=lower, upper=upper, moments=[moment_of(p, each) for p, each in found.moments])
 
 
 ProvenCases = Annotated[list[Path] | None, Parameter(help="Case files.", consume_multiple=True)]

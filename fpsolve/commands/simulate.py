@@ -19,7 +19,7 @@ from fpsolve.commands.options import (
     Flags,
     Fresh,
     kept,
-    of_curves,
+    of_sets,
     on_cases,
     saying_if_interrupted,
 )
@@ -27,9 +27,9 @@ from fpsolve.files import writable
 from fpsolve.pool import SERIAL, Pool
 from fpsolve.results.folders import own_folder
 from fpsolve.results.simulate import SIMULATION, write_simulation
-from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.solve.question import idle
 from fpsolve.solve.records import Records, answered
+from fpsolve.solve.set_result import SetResult, SimulatedSet
 from fpsolve.solve.simulate import (
     RECORDS,
     form_of_record,
@@ -48,55 +48,53 @@ from fpsolve.tell.solved import done_of, known_of
 
 @dataclass(eq=False)
 class Simulations:
-    """The simulations of the curves of a case, of which an earlier run may have kept some.
+    """The simulations of the parameter sets of a case, of which an earlier run may have kept some.
 
     Attributes:
-        case: whose curves these are.
-        simulated: what is done, in the order of the curves.
+        case: whose parameter sets these are.
+        simulated: what is done, in the order of the parameter sets.
         interruption: where an interrupt ended the simulation, what is kept, and how to go on; empty without interrupt.
         known: how many an earlier run had finished.
     """
 
     case: Case
-    simulated: list[SimulatedCurve] = field(default_factory=list)
+    simulated: list[SimulatedSet] = field(default_factory=list)
     interruption: str = ""
     known: int = 0
 
     @property
     def whole(self) -> int:
-        """How many curves are simulated to their end."""
+        """How many parameter sets are simulated to their end."""
         return sum(not each.interrupted for each in self.simulated)
 
-    def run(
-        self, folder: Path, pool: Pool, watch: Watch, results: Sequence[CurveResult] = (), *, is_fresh: bool
-    ) -> None:
-        """Simulate the curves, write what is found of each, and show it.
+    def run(self, folder: Path, pool: Pool, watch: Watch, results: Sequence[SetResult] = (), *, is_fresh: bool) -> None:
+        """Simulate the parameter sets, write what is found of each, and show it.
 
         Args:
             folder: where they are written and kept.
             pool: whose other machines simulate; all processors of this one where there are none.
-            results: what is solved of the same curves.
+            results: what is solved of the same parameter sets.
             is_fresh: whether to do all of them again.
         """
         case, is_elsewhere = self.case, pool.is_elsewhere
         orders, setting = case.simulated.tolist(), case.monte_carlo
-        work = Phase(case.name, "simulation", sum(map(simulation_steps, case.curves())), PERCENT)
+        work = Phase(case.name, "simulation", sum(map(simulation_steps, case.sets())), PERCENT)
         with watch.bar(work) as progress, writable(folder), pool if is_elsewhere else SERIAL as workers:
             found_of = answered(
                 Records(folder / RECORDS, is_fresh=is_fresh),
                 workers,
                 partial(simulation_of, orders=orders, setting=setting, progress=idle if is_elsewhere else progress),
-                case.curves(),
+                case.sets(),
                 kind=form_of_record(),
                 key=partial(simulation_key, orders=orders, setting=setting),
                 keeps=is_finished,
             )
             try:
-                for curve, found, is_known in found_of:
+                for parameter_set, found, is_known in found_of:
                     if is_elsewhere or is_known:
-                        progress(simulation_steps(curve), known=is_known)
+                        progress(simulation_steps(parameter_set), known=is_known)
                     self.known += is_known
-                    self.simulated.append(SimulatedCurve(curve, *found))
+                    self.simulated.append(SimulatedSet(parameter_set, *found))
                     write_simulation(case, self.simulated[-1], folder)
                     simulated_response_figure(case, self.simulated[-1]).write(folder)
                     if not is_finished(found):
@@ -119,7 +117,7 @@ def simulate_case(
     is_fresh: bool = False,
     watch: Watch = SILENT,
 ) -> Simulations:
-    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further curves monte_carlo-2.json, ….
+    """Simulate a case and write `out`/<name of the case>/monte_carlo.json, for further sets monte_carlo-2.json, ….
 
     A system with terms of degree 3 adds the stationary response. The files of an earlier simulation, and of a run with
     other parameters, are removed first. An interrupt (Ctrl-C) ends the simulation, and writes its estimates so far. The
@@ -127,18 +125,18 @@ def simulate_case(
 
     Args:
         pool: whose other machines simulate, such as a `cluster`; all processors of this one where there are none.
-        is_fresh: whether to simulate all curves again.
+        is_fresh: whether to simulate all parameter sets again.
 
     Raises:
         OutputError: the folder cannot be made or written to, or another run writes into it.
-        FpsolveError: a curve cannot be simulated; nothing is written.
+        FpsolveError: a parameter set cannot be simulated; nothing is written.
         KeyboardInterrupt: nothing was done yet, which its text says.
     """
     refuse_obstacles(case)
     folder, simulations, started = Path(out) / case.name, Simulations(case), datetime.now(UTC)
     with (
         own_folder(folder, "simulate", case=case),
-        saying_if_interrupted(lambda: kept(len(simulations.simulated), of_curves(case), folder)),
+        saying_if_interrupted(lambda: kept(len(simulations.simulated), of_sets(case), folder)),
     ):
         simulations.run(folder, pool, watch, is_fresh=is_fresh)
         blocks = chain(show(case, simulations.simulated), notes(case, simulations.simulated, MONTE_CARLO))

@@ -14,10 +14,10 @@ from .method import Budget as Budget
 from .method import Method as Method
 from .moments import EvenMoment as EvenMoment
 from .moments import even_moment as even_moment
-from .quantities import INDICES as INDICES
 from .quantities import QUANTITIES as QUANTITIES
-from .quantities import Index as Index
+from .quantities import SUMMARY_NUMBERS as SUMMARY_NUMBERS
 from .quantities import Quantity as Quantity
+from .quantities import SummaryNumber as SummaryNumber
 from .quantities import critical_impact_factor as critical_impact_factor
 from .quantities import critical_restitution as critical_restitution
 from .quantities import impact_rate as impact_rate

@@ -191,7 +191,7 @@ def stability_index(
 
 
 @dataclass(frozen=True)
-class Index(Quantity):
+class SummaryNumber(Quantity):
     """A quantity that is one number, and not one for each p.
 
     Attributes:
@@ -206,16 +206,16 @@ class Index(Quantity):
     interval: tuple[float, float] = (-math.inf, math.inf)
 
 
-def _index(
+def _summary_number(
     quantity: Quantity,
     solve: Callable[[ExponentSolver], Estimate | Absent],
-) -> Index:
+) -> SummaryNumber:
     """The theory is the number of this name of second-order perturbation theory; NaN where that does not apply."""
 
     def theory(problem: Problem) -> float:
         return float(getattr(second_order_or_none(problem), quantity.name, math.nan))
 
-    return Index(**vars(quantity), solve=solve, theory=theory)
+    return SummaryNumber(**vars(quantity), solve=solve, theory=theory)
 
 
 def _restitution_by_theory(problem: Problem) -> float:
@@ -223,18 +223,22 @@ def _restitution_by_theory(problem: Problem) -> float:
     return system.restitution_at(theory.critical_log_factor)[1] if theory and len(system.jumps) == 1 else math.nan
 
 
-LYAPUNOV_EXPONENT: Index = _index(quantity.LYAPUNOV_EXPONENT, lambda solver: solver.lyapunov_exponent())
-STABILITY_INDEX: Index = replace(_index(quantity.STABILITY_INDEX, nonzero_root), interval=SEARCH_INTERVAL)
-VARIANCE_RATE = _index(quantity.VARIANCE_RATE, lambda solver: solver.variance_rate())
-IMPACT_RATE = _index(quantity.IMPACT_RATE, impact_rate)
-CRITICAL_IMPACT_FACTOR = _index(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)
-CRITICAL_RESTITUTION = Index(
+LYAPUNOV_EXPONENT: SummaryNumber = _summary_number(
+    quantity.LYAPUNOV_EXPONENT, lambda solver: solver.lyapunov_exponent()
+)
+STABILITY_INDEX: SummaryNumber = replace(
+    _summary_number(quantity.STABILITY_INDEX, nonzero_root), interval=SEARCH_INTERVAL
+)
+VARIANCE_RATE = _summary_number(quantity.VARIANCE_RATE, lambda solver: solver.variance_rate())
+IMPACT_RATE = _summary_number(quantity.IMPACT_RATE, impact_rate)
+CRITICAL_IMPACT_FACTOR = _summary_number(quantity.CRITICAL_IMPACT_FACTOR, critical_impact_factor)
+CRITICAL_RESTITUTION = SummaryNumber(
     **vars(quantity.CRITICAL_RESTITUTION),
     solve=critical_restitution,
     theory=_restitution_by_theory,
     interval=(0.0, 1.0),
 )
-INDICES: Mapping[str, Index] = {
+SUMMARY_NUMBERS: Mapping[str, SummaryNumber] = {
     each.name: each
     for each in (
         LYAPUNOV_EXPONENT,
@@ -247,4 +251,4 @@ INDICES: Mapping[str, Index] = {
 }
 OF_IMPACTS = IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name, CRITICAL_RESTITUTION.name
 """Those of them that a system without impacts has not."""
-QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **INDICES}
+QUANTITIES: Mapping[str, Quantity] = {MOMENT.name: MOMENT, **SUMMARY_NUMBERS}

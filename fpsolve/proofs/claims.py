@@ -55,7 +55,7 @@ class MomentBound(Bound):
     p: float
 
 
-class IndexBound(Record):
+class StabilityIndexBound(Record):
     """Of δ_p, from Λ at two p beside it."""
 
     lower: float | None
@@ -83,7 +83,7 @@ class IndexBound(Record):
             yield "the bounds of δ_p are closer than the two p"
 
 
-class CurveClaims(Record):
+class SetClaims(Record):
     """What is claimed for one parameter set.
 
     Attributes:
@@ -93,13 +93,13 @@ class CurveClaims(Record):
     parameters: dict[str, float | str]
     moments: list[MomentBound]
     lyapunov_exponent: Bound | None
-    stability_index: IndexBound | None
+    stability_index: StabilityIndexBound | None
     verdicts: list[str]
 
     @property
-    def claims(self) -> Mapping[str, Bound | IndexBound]:
+    def claims(self) -> Mapping[str, Bound | StabilityIndexBound]:
         """All bounds, by the places where they stand."""
-        found: dict[str, Bound | IndexBound] = {f"moments.{i}": each for i, each in enumerate(self.moments)}
+        found: dict[str, Bound | StabilityIndexBound] = {f"moments.{i}": each for i, each in enumerate(self.moments)}
         if self.lyapunov_exponent is not None:
             found["lyapunov_exponent"] = self.lyapunov_exponent
         if self.stability_index is not None:
@@ -125,17 +125,17 @@ class Claims(Record):
     fpsolve: str
     case: str
     complete: bool
-    curves: Annotated[list[CurveClaims], Field(min_length=1)]
+    sets: Annotated[list[SetClaims], Field(min_length=1)]
 
     @property
     def count(self) -> int:
         """How many numbers are bounded."""
-        return sum(each.lower is not None for curve in self.curves for each in curve.claims.values())
+        return sum(each.lower is not None for parameter_set in self.sets for each in parameter_set.claims.values())
 
     def objections(self) -> Iterator[str]:
         """What does not follow, after the place where it stands."""
-        for i, curve in enumerate(self.curves):
-            yield from (f"curves.{i}.{text}" for text in curve.objections())
+        for i, parameter_set in enumerate(self.sets):
+            yield from (f"sets.{i}.{text}" for text in parameter_set.objections())
 
 
 def bound_of(found: Enclosure | None) -> Bound:

@@ -31,7 +31,7 @@ INDEX_WIDTH, WIDENINGS = 1e-6, 4
 
 
 @dataclass(frozen=True)
-class IndexEnclosure:
+class StabilityIndexEnclosure:
     """Two p of one sign between which Λ changes its own, so that δ_p lies between them.
 
     Λ is convex and Λ(0) = 0, so that there is one such place at most.
@@ -51,7 +51,7 @@ class IndexEnclosure:
         return bool(self.moments)
 
 
-NO_INDEX = IndexEnclosure(-math.inf, math.inf)
+NO_INDEX = StabilityIndexEnclosure(-math.inf, math.inf)
 
 
 def prove(
@@ -109,7 +109,7 @@ def prove_lyapunov_exponent(
 
 def prove_stability_index(
     problem: Problem, *, budget: Budget | None = None, progress: Callable[[], None] = lambda: None
-) -> IndexEnclosure:
+) -> StabilityIndexEnclosure:
     """Bounds on the stability index δ_p, from the signs of Λ beside it; as `prove`, but they may take twice as long."""
     return prove_index(problem, statement_of(problem), budget or Budget(), progress)
 
@@ -162,7 +162,7 @@ def _of_second_moments(problem: Problem, stated: LinearRecord, p: float | None, 
 
 def prove_index(
     problem: Problem, stated: Statement | LinearRecord, budget: Budget, progress: Callable[[], None] = lambda: None
-) -> IndexEnclosure:
+) -> StabilityIndexEnclosure:
     """Bounds on δ_p; none where there is none, or where it is not found.
 
     They may take twice as long, as they need bounds at two p.
@@ -192,6 +192,6 @@ def prove_index(
                 if not moments[-1][1].sign:  # the time is for wider ones
                     break
             if len(moments) == 2 and moments[0][1].sign * moments[1][1].sign < 0:
-                return IndexEnclosure(low, high, tuple(moments))
+                return StabilityIndexEnclosure(low, high, tuple(moments))
         half *= 10
     return NO_INDEX

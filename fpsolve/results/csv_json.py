@@ -1,4 +1,4 @@
-"""The table of a case as curves.csv and moments.csv, and with all that is known of few sets as summary.json."""
+"""The table of a case as sets.csv and moments.csv, and with all that is known of few sets as summary.json."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fpsolve import __version__
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import RECORDS, Sensitivities, Slopes
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SENSITIVITIES
 from fpsolve.exponent.error import MEANINGLESS, Estimate, InvariantClass
 from fpsolve.files import write_csv, write_json
@@ -26,9 +26,9 @@ from fpsolve.model.quantity import LYAPUNOV_EXPONENT
 from fpsolve.results.known import Results
 from fpsolve.results.netcdf import write_dataset
 from fpsolve.results.table import plain
-from fpsolve.solve.curve import CurveResponse, CurveResult
 from fpsolve.solve.intervals import spreads_of
 from fpsolve.solve.moments import CLASSES
+from fpsolve.solve.set_result import SetResponse, SetResult
 
 Content = dict[str, object]
 """What JSON holds by its name."""
@@ -75,7 +75,7 @@ def write_summary(results: Results, path: Path, facts: Content) -> None:
 
 
 Writer = Callable[[Results, Path, Content], None]
-GROWING: dict[str, Writer] = {"summary.json": write_summary, "curves.csv": write_numbers, "moments.csv": write_moments}
+GROWING: dict[str, Writer] = {"summary.json": write_summary, "sets.csv": write_numbers, "moments.csv": write_moments}
 """What writes each of the files with numbers of all sets while a run grows."""
 TABLES: dict[str, Writer] = GROWING | {"results.nc": write_dataset}
 """What writes all files with numbers of all sets at the end, and takes the `facts_of` the run."""
@@ -89,11 +89,11 @@ def summary_line(results: Results, facts: Content) -> str:
 def summary(results: Results, facts: Content) -> Content:
     """Whether all sets are there, and of each the numbers of the table, those that no table has, and the messages."""
     case, done, table = results.case, len(results.whole), results.table
-    curves = [
+    sets = [
         {
-            **parameters_of(each.curve),
-            **({"moments": table.over_p(each.curve.number)} if table.p.size else {}),
-            **table.row(each.curve.number),
+            **parameters_of(each.parameter_set),
+            **({"moments": table.over_p(each.parameter_set.number)} if table.p.size else {}),
+            **table.row(each.parameter_set.number),
             "discretisation": each.discretisation,
             **_beyond(case, each),
             "warnings": [*each.warnings, *(failure.reason for failure in each.failures)],
@@ -102,7 +102,7 @@ def summary(results: Results, facts: Content) -> Content:
         for each in results
     ]
     state = {"complete": done == case.planned, "planned": case.planned, "done": done}
-    return {**head(case), **state, **facts, "curves": curves}
+    return {**head(case), **state, **facts, "sets": sets}
 
 
 def head(case: Case) -> Content:
@@ -111,9 +111,9 @@ def head(case: Case) -> Content:
     return {"case": case.name, "title": case.title, "fpsolve_version": __version__, "units": units}
 
 
-def parameters_of(curve: Curve) -> Content:
-    """Those of a curve, in JSON."""
-    return {"parameters": dict(curve.parameters), "varied": dict(curve.varied)}
+def parameters_of(parameter_set: ParameterSet) -> Content:
+    """Those of a parameter set, in JSON."""
+    return {"parameters": dict(parameter_set.parameters), "varied": dict(parameter_set.varied)}
 
 
 def with_error(name: str, found: Estimate | None) -> Content:
@@ -126,8 +126,8 @@ def sampled(value: float, error: float | None) -> Content:
     return {"value": value, "standard_error": error}
 
 
-def _beyond(case: Case, result: CurveResult) -> Content:
-    """What no table has of a curve, by its name; None where it is asked for and not there."""
+def _beyond(case: Case, result: SetResult) -> Content:
+    """What no table has of a parameter set, by its name; None where it is asked for and not there."""
     found = Content()
     if classes := result.parts.get(CLASSES.name):
         found[CLASSES.name] = [_class(each) for each in classes]
@@ -137,7 +137,7 @@ def _beyond(case: Case, result: CurveResult) -> Content:
         found[RESPONSE] = result.response and _response(result.response)
     if SENSITIVITIES in case.asked:
         found[SENSITIVITIES] = result.sensitivities and _sensitivities(result.sensitivities)
-    if case.uncertain and result.curve.is_possible:
+    if case.uncertain and result.parameter_set.is_possible:
         found["uncertainty"] = _uncertainty(case, result)
     return found
 
@@ -157,8 +157,10 @@ def _sensitivities(known: Sensitivities) -> Content:
             return {key: of(each) if each.relative_error <= MEANINGLESS else None for key, each in slopes.items()}
 
         moments = zip(known.p.tolist(), known.moments, strict=True)
-        indices = {name: row(known.indices[name]) if name in known.indices else None for name in RECORDS}
-        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **indices}
+        summary_numbers = {
+            name: row(known.summary_numbers[name]) if name in known.summary_numbers else None for name in RECORDS
+        }
+        return {"moments": [{"p": p, **row(slopes)} for p, slopes in moments], **summary_numbers}
 
     errors = numbers(lambda each: each.error_estimate)
     return {**numbers(lambda each: each.value), "errors": errors}
@@ -183,7 +185,7 @@ def _excursion(case: Case, found: Excursion) -> Content:
     }
 
 
-def _response(found: CurveResponse) -> Content:
+def _response(found: SetResponse) -> Content:
     """What the density does near rest, and how far the means, which are in the table, are to be trusted."""
     if found.balance is None:
         return {}
@@ -196,16 +198,16 @@ def _response(found: CurveResponse) -> Content:
     }
 
 
-def _uncertainty(case: Case, result: CurveResult) -> Content:
-    """What is uncertain of a curve, and how that of the parameters is."""
-    found, laws = spreads_of(case, result), case.uncertain.laws(result.curve.problem)
+def _uncertainty(case: Case, result: SetResult) -> Content:
+    """What is uncertain of a parameter set, and how that of the parameters is."""
+    found, laws = spreads_of(case, result), case.uncertain.laws(result.parameter_set.problem)
     return {
         "level": LEVEL,
         "laws": {
             key: {"value": each.value, "sd": each.sd, "mean": each.mean, "deviation": each.deviation}
             for key, each in laws.items()
         },
-        **{name: _spread(found.indices[name]) if name in found.indices else None for name in UNCERTAIN},
+        **{name: _spread(found.summary_numbers[name]) if name in found.summary_numbers else None for name in UNCERTAIN},
         "moments": [{"p": p, **_spread(each)} for p, each in found.moments.items()],
     }
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.case.case import Curve
+from fpsolve.case.case import ParameterSet
 from fpsolve.data import Quantity, dataset
 from fpsolve.exponent.density import Densities, DirectionGrid
 from fpsolve.files import write_bytes
 from fpsolve.model.quantity import MOMENT, P
 from fpsolve.results.nodes import FIELDS
-from fpsolve.results.vtk import facts_of_curve, write_between, write_series
+from fpsolve.results.vtk import facts_of_set, write_between, write_series
 
 ERROR = Quantity(
     "density_error",
@@ -28,13 +28,17 @@ ERROR = Quantity(
 STATIONARY = Quantity("stationary_density", "ρ", "stationary density", r"$\rho$")
 
 
-def directions_file(curve: Curve, folder: Path) -> Path:
-    """Where the densities of a curve are."""
-    return folder / f"densities{curve.suffix}.nc"
+def directions_file(parameter_set: ParameterSet, folder: Path) -> Path:
+    """Where the densities of a parameter set are."""
+    return folder / f"densities{parameter_set.suffix}.nc"
 
 
 def _write_numbers(
-    grid: DirectionGrid, stationary: Densities | None, shown: Sequence[Densities], curve: Curve, folder: Path
+    grid: DirectionGrid,
+    stationary: Densities | None,
+    shown: Sequence[Densities],
+    parameter_set: ParameterSet,
+    folder: Path,
 ) -> None:
     """Write densities.nc: the stationary density, if it is there, and the fields at the p that are shown."""
     plane = tuple(each.name for each in grid.quantities)
@@ -54,13 +58,13 @@ def _write_numbers(
     if grid.share:
         places[grid.share] = np.sin(grid.first) ** 2
     content = io.BytesIO()  # HDF5 does not survive a full disk
-    whole = dataset("densities of directions", "finite elements", numbers, places, curve.parameters)
+    whole = dataset("densities of directions", "finite elements", numbers, places, parameter_set.parameters)
     whole.to_netcdf(content, engine="h5netcdf")
-    write_bytes(directions_file(curve, folder), content.getvalue())
+    write_bytes(directions_file(parameter_set, folder), content.getvalue())
 
 
-def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> None:
-    """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first curve the stationary density.
+def write_directions(found: Sequence[Densities], parameter_set: ParameterSet, folder: Path) -> None:
+    """Write densities.nc and, as `write_eigenfunctions`, a series over p; with the first set the stationary density.
 
     The files for ParaView show x = η and y = θ₁ − θ₂ of four variables, with a stop y = θ₁ between two impacts, so that
     T jumps from one edge to the other, and of three variables the unit sphere. At p = 0
@@ -72,14 +76,14 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
     found = [each.on(grid) for each in found]
     stationary = next((each for each in found if not each.pair.p), None)
     tilted = [each for each in found if each.pair.p]
-    _write_numbers(grid, stationary, tilted or found, curve, folder)
+    _write_numbers(grid, stationary, tilted or found, parameter_set, folder)
     along = {f"along_{side}": axis.in_words() for side, axis in zip("xy", grid.quantities, strict=True)}
-    facts = {**facts_of_curve(curve), **along}
+    facts = {**facts_of_set(parameter_set), **along}
     first, second = np.meshgrid(grid.first, grid.second, indexing="ij")
     places = [first, second, 0 * first] if grid.share else [*grid.directions.reshape(3, *first.shape)]
     always = {"stationary_density": stationary.fields.T_adjoint} if stationary else {}
     always |= {"share": np.sin(first) ** 2} if grid.share else {"longitude": first, "latitude": second}
-    if stationary and curve.number == 1:
+    if stationary and parameter_set.number == 1:
         write_between(folder / "density.vtu", places, always, {"p": 0.0, "Lambda": 0.0, **facts})
 
     def write(path: Path, each: Densities) -> None:
@@ -87,4 +91,4 @@ def write_directions(found: Sequence[Densities], curve: Curve, folder: Path) -> 
         write_between(path, places, {**data, **always}, {"p": each.pair.p, "Lambda": each.value, **facts})
 
     if tilted:
-        write_series(folder, f"eigenfunctions{curve.suffix}", {each.pair.p: each for each in tilted}, write)
+        write_series(folder, f"eigenfunctions{parameter_set.suffix}", {each.pair.p: each for each in tilted}, write)

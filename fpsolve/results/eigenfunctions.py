@@ -1,7 +1,7 @@
 """Eigenfunctions over phase and noise, and the stationary density: files for ParaView, and their pictures on a page.
 
 The files have Lagrange quadrilaterals on the full circle, x = φ, y = ξ. They show the elements' polynomials at
-their `Nodes`; their field data name the curve. Where the noise has states, y is the number of the state, each a strip.
+their `Nodes`; their field data name the set. Where the noise has states, y is the number of the state, each a strip.
 Field data are numbers, as meshio refuses texts: a text is the codes of its letters,
 `bytes(mesh.field_data["held"]).decode()`.
 """
@@ -16,7 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import EIGENFUNCTIONS
 from fpsolve.exponent.density import xi_marginal
 from fpsolve.exponent.eigen import PrincipalPair
@@ -27,7 +27,7 @@ from fpsolve.results.nodes import Nodes
 from fpsolve.results.vtk import (
     Facts,
     collection_of,
-    facts_of_curve,
+    facts_of_set,
     name_at,
     pyvista_module,
     write_points,
@@ -35,19 +35,16 @@ from fpsolve.results.vtk import (
 )
 from fpsolve.solve.eigenfunctions import Eigenfunctions
 
-CURVES = "curves.pvd"
-"""The file of the series over curves."""
 
-
-def write_pictures(found: Eigenfunctions, curve: Curve, folder: Path) -> None:
-    """Write the eigenfunctions of a curve; with the first curve the stationary density too, if that is wanted."""
+def write_pictures(found: Eigenfunctions, parameter_set: ParameterSet, folder: Path) -> None:
+    """Write the eigenfunctions of a parameter set; with the first set the stationary density too, if that is wanted."""
     if found.stationary is None:
         return
-    facts = facts_of_curve(curve)
-    if curve.number == 1 and found.has_density:
+    facts = facts_of_set(parameter_set)
+    if parameter_set.number == 1 and found.has_density:
         write_density(folder / "density.vtu", found.stationary, facts)
     if found.pairs:
-        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{curve.suffix}", facts)
+        write_eigenfunctions(folder, found.pairs, found.stationary, f"eigenfunctions{parameter_set.suffix}", facts)
 
 
 def write_eigenfunctions(
@@ -63,7 +60,7 @@ def write_eigenfunctions(
     T, which ParaView shows first, has mean 1 over P_s(ξ)/2π, see `fields`, and is cut off beyond e^±600;
     ∫T T* dφ dξ = 1. Where the noise has states `z` is the number of one, and densities are per radian.
     Field data: `p`; `Lambda`, Λ(p); `impacts`, where T jumps; `along_y`, what stands along y; and the facts, those of a
-    case its parameters and, in words with units, `varied`, those that are varied, and `held`, the others.
+    case its parameters and, in words with units, `varied`, those that are varied, and `fixed`, the others.
 
     Args:
         directory: the folder, made where it is missing.
@@ -112,18 +109,18 @@ FILES: Mapping[str, Callable[..., None]] = {
     EIGENFUNCTIONS: write_pictures,
     DIRECTIONS.part: write_directions,
 }
-"""Each writes what was found of a curve, and no record holds, into a folder, by the names of questions."""
+"""Each writes what was found of a parameter set, and no record holds, into a folder, by the names of questions."""
 
 
-def write_curves(case: Case, folder: Path) -> None:
-    """Write `curves.pvd`, a time series over the curves of which there are eigenfunctions in a folder, all at one p.
+def write_sets(case: Case, folder: Path) -> None:
+    """Write `sets.pvd`, a time series over the sets of which there are eigenfunctions in a folder, all at one p.
 
-    The time is the varied value where there is one that is a number, and else the number of the curve; the name of each
-    entry tells which, and p. Nothing is written of a single curve.
+    The time is the varied value where there is one that is a number, and else the number of the set; the name of each
+    entry tells which, and p. Nothing is written of a single parameter set.
     """
-    p, shown = case.usual_p, case.curves() if case.shown.size and case.output.asks_for_eigenfunctions else ()
-    names = [(curve, name_at(f"eigenfunctions{curve.suffix}", p)) for curve in shown]
-    there = [(curve, name) for curve, name in names if (folder / name).is_file()]
+    p, shown = case.usual_p, case.sets() if case.shown.size and case.output.asks_for_eigenfunctions else ()
+    names = [(parameter_set, name_at(f"eigenfunctions{parameter_set.suffix}", p)) for parameter_set in shown]
+    there = [(parameter_set, name) for parameter_set, name in names if (folder / name).is_file()]
     if case.planned == 1 or not there:
         return
     keys = [key for key in case.vary.keys if len(case.vary.values(key)) > 1]
@@ -132,7 +129,7 @@ def write_curves(case: Case, folder: Path) -> None:
         (float(each.varied[keys[0]] if is_number else each.number), name, f"{each.label}, p = {p:g}")
         for each, name in there
     )
-    write_text(folder / CURVES, collection_of(sorted(entries)))
+    write_text(folder / "sets.pvd", collection_of(sorted(entries)))
 
 
 def _write_grid(path: Path, grid: Nodes, data: Mapping[str, FloatArray], facts: Facts) -> None:

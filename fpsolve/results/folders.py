@@ -42,7 +42,7 @@ def own_folder(
         OutputError: the folder cannot be made or written to, another run writes into it, or a folder is
             where a file is that the commands wrote; nothing is removed.
     """
-    sets = json.dumps([case.curve({}).digest, case.vary.mode, case.vary.columns]) if case else ""
+    sets = json.dumps([case.parameter_set({}).digest, case.vary.mode, case.vary.columns]) if case else ""
     digest = sha256(sets.encode()).hexdigest()
     with alone(folder):
         with writable(folder):

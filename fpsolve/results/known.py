@@ -1,4 +1,4 @@
-"""What is known of the curves of a case: their records become results, and their work becomes records."""
+"""What is known of the parameter sets of a case: their records become results, and their work becomes records."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.model.quantity import STATUS
 from fpsolve.results.table import Table
-from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.discretisation import QUESTION as DISCRETISATION
 from fpsolve.solve.discretisation import largest_of
 from fpsolve.solve.moments import QUESTION as MOMENTS
 from fpsolve.solve.question import Asked, Job, Numerics
 from fpsolve.solve.questions import BY_NAME
 from fpsolve.solve.records import Entries, Records, key_of, made, plain
+from fpsolve.solve.set_result import SetResult
 from fpsolve.solve.sets import everything, result_of
 
 ROW = "row"
@@ -66,18 +66,18 @@ def read_into(job: Job, record: Entries, names: Mapping[str, str], *, is_all: bo
     return job
 
 
-class Results(Sequence[CurveResult]):
-    """What is known of the curves of a case, in their order; each is made of its records when it is looked at.
+class Results(Sequence[SetResult]):
+    """What is known of the parameter sets of a case, in their order; each is made of its records when it is looked at.
 
     Args:
-        case: whose curves these are.
+        case: whose parameter sets these are.
         records: those of its folder.
 
     Attributes:
         case: the same.
-        asked: what is asked of the first curve, and of each other one.
+        asked: what is asked of the first parameter set, and of each other one.
         table: the numbers and messages of all that are known.
-        whole: the numbers of the curves of which all is known that is asked for.
+        whole: the numbers of the parameter sets of which all is known that is asked for.
     """
 
     def __init__(self, case: Case, records: Records) -> None:
@@ -88,24 +88,24 @@ class Results(Sequence[CurveResult]):
         self.read()
 
     def job(self, number: int, *, is_all: bool = False) -> Job:
-        """The work on the curve with a number, with what is known of it; or also with what is to be sought again."""
+        """The work on the set with a number, with what is known of it; or also with what is to be sought again."""
         vary, place = self.case.vary, number > 1
-        curve = Curve(self.case.problem, vary.sets[number - 1], number)
-        job = Job(curve, self.asked[place], self._numerics, vary.line_of(number))
-        return read_into(job, self._records.get(curve.digest), self._names[place], is_all=is_all)
+        parameter_set = ParameterSet(self.case.problem, vary.sets[number - 1], number)
+        job = Job(parameter_set, self.asked[place], self._numerics, vary.line_of(number))
+        return read_into(job, self._records.get(parameter_set.digest), self._names[place], is_all=is_all)
 
-    def add(self, job: Job) -> CurveResult:
-        """Take what is known of a curve into the table."""
-        number, result = job.curve.number, result_of(job)
+    def add(self, job: Job) -> SetResult:
+        """Take what is known of a parameter set into the table."""
+        number, result = job.parameter_set.number, result_of(job)
         if job.is_whole:
             self.whole.add(number)
         self.table.put(result)
         return result
 
-    def put(self, curve: Curve, record: Entries) -> CurveResult:
-        """Keep what was solved of a curve."""
-        self._records.put(curve.digest, record)
-        return self.add(self.job(curve.number, is_all=True))
+    def put(self, parameter_set: ParameterSet, record: Entries) -> SetResult:
+        """Keep what was solved of a parameter set."""
+        self._records.put(parameter_set.digest, record)
+        return self.add(self.job(parameter_set.number, is_all=True))
 
     def read(self, *, is_all: bool = False) -> None:
         """Take in what records hold of the sets that are finished, or of all."""
@@ -117,22 +117,22 @@ class Results(Sequence[CurveResult]):
 
     @property
     def numbers(self) -> list[int]:
-        """Those of the curves of which anything is known."""
+        """Those of the parameter sets of which anything is known."""
         return (1 + np.flatnonzero(np.isfinite(self.table[STATUS.name].values))).tolist()
 
     @property
-    def telling(self) -> Iterator[CurveResult]:
+    def telling(self) -> Iterator[SetResult]:
         """Those of which something is said."""
         return (self.of(number) for number in self.numbers if self.table.messages[number - 1])
 
-    def of(self, number: int) -> CurveResult:
-        """That of the curve with a number."""
+    def of(self, number: int) -> SetResult:
+        """That of the parameter set with a number."""
         return result_of(self.job(number, is_all=True))
 
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def __iter__(self) -> Iterator[CurveResult]:
+    def __iter__(self) -> Iterator[SetResult]:
         return map(self.of, self.numbers)
 
     def __getitem__(self, index: Any) -> Any:

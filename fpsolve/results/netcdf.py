@@ -18,7 +18,7 @@ from fpsolve.errors import FpsolveError
 from fpsolve.files import write_bytes
 from fpsolve.model.quantity import STATUS, P
 from fpsolve.results.known import Results
-from fpsolve.solve.curve import Status
+from fpsolve.solve.set_result import Status
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
     xarray would write the same, but takes with pandas and Dask as long to import as small cases take in all.
 
     Args:
-        results: of all curves.
+        results: of all parameter sets.
         path: the file.
         facts: on the run, see `facts_of`; they become attributes, tables as JSON.
     """
@@ -75,7 +75,7 @@ def write_dataset(results: Results, path: Path, facts: Mapping[str, object]) -> 
         if table.p.size:
             write("p", ["p"], table.p, P.attributes)
         known = {key: each if isinstance(each, str | float | int) else json.dumps(each) for key, each in facts.items()}
-        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.constants}
+        about = {"title": case.title, "case": case.name, "Conventions": "CF-1.11", "rtol": case.rtol, **case.fixed}
         file.attrs.update({**about, **known, "complete": int(len(results.whole) == case.planned)})
     write_bytes(path, content.getvalue())
 
@@ -84,7 +84,7 @@ def open_results(*places: str | Path) -> xr.Dataset:
     """The results of several runs as one dataset over `row`, which has one for each p of each set: those of its run.
 
     `set` and `p` are an index, by which `sel` selects: `open_results("results/*").sel(p=2.0)` is over the sets. `run`
-    and every parameter, varied or held, are coordinates. What a run has not is NaN, or an empty text; a set of a run
+    and every parameter, varied or fixed, are coordinates. What a run has not is NaN, or an empty text; a set of a run
     without moments is one row, whose p is NaN.
 
     >>> open_results("results/minimal").moment.values.shape
@@ -124,7 +124,7 @@ def _rows(found: xr.Dataset, name: str, before: int) -> xr.Dataset:
     if "p" not in found.dims:
         found = found.assign_coords(p=[math.nan])
     rows = found.stack({ROW: [*found[STATUS.name].dims, "p"]}).reset_index(ROW).reset_coords()
-    held = {key for key in found.attrs if str(key).partition(".")[0] in ("oscillator", "system", "noise")}
-    rows.attrs = {key: value for key, value in found.attrs.items() if key not in held}
+    fixed = {key for key in found.attrs if str(key).partition(".")[0] in ("oscillator", "system", "noise")}
+    rows.attrs = {key: value for key, value in found.attrs.items() if key not in fixed}
     numbers = before + 1 + np.arange(rows.sizes[ROW]) // found.sizes["p"]
-    return rows.assign({SET: (ROW, numbers), "run": name, **{key: found.attrs[key] for key in held}})
+    return rows.assign({SET: (ROW, numbers), "run": name, **{key: found.attrs[key] for key in fixed}})

@@ -1,4 +1,4 @@
-"""The numbers of a case as one table: a column for each quantity, over the curves, or over these and p."""
+"""The numbers of a case as one table: a column for each quantity, over the parameter sets, or over these and p."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.data import Quantity
 from fpsolve.model.quantity import MOMENT, SECONDS, STATUS
-from fpsolve.solve.curve import CurveResult, Number, Status
 from fpsolve.solve.questions import QUESTIONS
+from fpsolve.solve.set_result import Number, SetResult, Status
 
 Cell = str | float | None
 """What CSV and JSON have of a number: nothing where there is none."""
@@ -21,7 +21,7 @@ COUNTS = (
     Quantity("p_solved", "p solved", "number of p that are solved"),
     Quantity("p_failed", "p failed", "number of p that failed"),
 )
-"""The numbers of p of a curve."""
+"""The numbers of p of a parameter set."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class Column:
 
     Attributes:
         quantity: with its unit, and "p" among its `dims` where it is a function of p.
-        values: shape (curves,), or (curves, p); NaN where there is none.
+        values: shape (sets,), or (sets, p); NaN where there is none.
     """
 
     quantity: Quantity
@@ -38,18 +38,18 @@ class Column:
 
 
 class Table(dict[str, Column]):
-    """Columns by the names of their quantities, those over p first, with a row for each curve of a case.
+    """Columns by the names of their quantities, those over p first, with a row for each parameter set of a case.
 
     Args:
         case: which tells what is asked for.
-        results: of some of its curves.
+        results: of some of its parameter sets.
 
     Attributes:
         p: over which the columns over p are, shape (p,).
-        messages: what is said of each curve, joined by "; ".
+        messages: what is said of each parameter set, joined by "; ".
     """
 
-    def __init__(self, case: Case, results: Iterable[CurveResult] = ()) -> None:
+    def __init__(self, case: Case, results: Iterable[SetResult] = ()) -> None:
         self._case, self.p = case, case.p if MOMENT.name in case.asked else np.zeros(0)
         self._places = {p: place for place, p in enumerate(self.p.tolist())}
         self.messages = [""] * case.planned
@@ -60,9 +60,9 @@ class Table(dict[str, Column]):
         for result in results:
             self.put(result)
 
-    def put(self, result: CurveResult) -> None:
-        """Fill in the numbers and the messages of a curve."""
-        curve, solved = result.curve.number - 1, result.moments.p
+    def put(self, result: SetResult) -> None:
+        """Fill in the numbers and the messages of a parameter set."""
+        parameter_set, solved = result.parameter_set.number - 1, result.moments.p
         places = [self._places[p] for p in solved.tolist()] if self.p.size else []
         counts = solved.size, self.p.size - solved.size, result.status, round(result.seconds, 6)
         numbers: dict[Quantity, Number] = dict(zip((*COUNTS, STATUS, SECONDS), counts, strict=True))
@@ -70,8 +70,8 @@ class Table(dict[str, Column]):
             numbers |= question.numbers(self._case, result)
         for quantity, found in numbers.items():
             if found is not None:
-                self[quantity.name].values[(curve, places) if quantity.dims else curve] = found
-        self.messages[curve] = "; ".join(text for texts in result.remarks.values() for text in texts)
+                self[quantity.name].values[(parameter_set, places) if quantity.dims else parameter_set] = found
+        self.messages[parameter_set] = "; ".join(text for texts in result.remarks.values() for text in texts)
 
     def row(self, number: int) -> dict[str, Cell]:
         """The summary numbers of a set by its number, by the names of the columns."""

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Curve
+from fpsolve.case.case import ParameterSet
 from fpsolve.data import written
 from fpsolve.files import write_text
 from fpsolve.model.parameters import Parameter
@@ -21,22 +21,22 @@ Facts = Mapping[str, Any]
 """Field data by their names."""
 
 
-def facts_of_curve(curve: Curve) -> Facts:
-    """The field data of a curve: its number, its parameters, and in words those that are varied and those held.
+def facts_of_set(parameter_set: ParameterSet) -> Facts:
+    """The field data of a set: its number, its parameters, and in words those that are varied and those fixed.
 
-    A parameter that is a word is in the name. The words are in ASCII, `held` with a line for each section.
+    A parameter that is a word is in the name. The words are in ASCII, `fixed` with a line for each section.
     """
-    known, sections = curve.problem.parameters, dict[str, list[str]]()
+    known, sections = parameter_set.problem.parameters, dict[str, list[str]]()
     for key, parameter in known.items():
-        if key not in curve.varied:
+        if key not in parameter_set.varied:
             section, _, name = key.rpartition(".")
             sections.setdefault(section, []).append(f"{name} = {_valued(parameter)}")
     words = {
-        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in curve.varied),
-        "held": "\n".join(f"{section}: {', '.join(each)}" for section, each in sections.items()),
+        "varied": ", ".join(f"{key} = {_valued(known[key])}" for key in parameter_set.varied),
+        "fixed": "\n".join(f"{section}: {', '.join(each)}" for section, each in sections.items()),
     }
-    facts: dict[str, Any] = {"curve": float(curve.number)}
-    for key, value in curve.parameters.items():
+    facts: dict[str, Any] = {"set": float(parameter_set.number)}
+    for key, value in parameter_set.parameters.items():
         facts |= {f"{key} = {value}": 1.0} if isinstance(value, str) else {key: value}
     return facts | {name: text.replace("²", "^2") for name, text in words.items() if text}
 

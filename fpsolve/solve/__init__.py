@@ -1,4 +1,4 @@
-"""What a case asks of each curve becomes numbers, once."""
+"""What a case asks of each parameter set becomes numbers, once."""
 
 import lazy_loader
 

@@ -1,12 +1,12 @@
 from .chart import Chart as Chart
 from .check import compare as compare
 from .check import expected as expected
-from .curve import CurveResult as CurveResult
-from .curve import SimulatedCurve as SimulatedCurve
 from .prove import check_proof as check_proof
 from .question import Entry as Entry
 from .question import Job as Job
 from .question import Question as Question
 from .questions import QUESTIONS as QUESTIONS
-from .sets import solve_curve as solve_curve
+from .set_result import SetResult as SetResult
+from .set_result import SimulatedSet as SimulatedSet
+from .sets import solve_set as solve_set
 from .simulate import simulation_of as simulation_of

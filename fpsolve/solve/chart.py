@@ -170,7 +170,7 @@ def closed_forms_of(lines: Sequence[Boundary]) -> tuple[tuple[FloatArray, ...], 
 def key_of_line(case: Case, line: Boundary) -> str:
     """What the records of the points of a line are found by."""
     axes = (replace(axis, at=()) for axis in (line.x, line.y))
-    return key_of(case.curve({}).digest, [repr(each) for each in (line.target, *axes, line.budget, line.rtol)])
+    return key_of(case.parameter_set({}).digest, [repr(each) for each in (line.target, *axes, line.budget, line.rtol)])
 
 
 def recalled(records: Records, key: str, line: Boundary) -> Boundary:

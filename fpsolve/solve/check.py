@@ -13,12 +13,12 @@ from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE, Expectation, Varied
 from fpsolve.errors import FpsolveError, NoHierarchy
 from fpsolve.exponent.moments import even_moment, refuse_open_hierarchy
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import SUMMARY_NUMBERS
 from fpsolve.messages import Message
-from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.moments import QUESTION as MOMENTS
 from fpsolve.solve.question import Asked, Job, Settings
-from fpsolve.solve.sets import result_of, solve_set
+from fpsolve.solve.set_result import SetResult
+from fpsolve.solve.sets import attempt_set, result_of
 
 SOURCE = "moment hierarchy; ± the stated error"
 """The source of values by the hierarchy."""
@@ -35,14 +35,14 @@ class Comparison:
     met: bool
 
     @classmethod
-    def of(cls, wanted: Expectation, result: CurveResult) -> Comparison:
-        """An expectation beside a curve."""
+    def of(cls, wanted: Expectation, result: SetResult) -> Comparison:
+        """An expectation beside a parameter set."""
         response = result.response.numbers if result.response else {}
         known = response if wanted.of_response else result.estimates
         found = known.get(wanted.of_response or wanted.quantity) if wanted.p is None else result.moment(wanted.p)
         value, tolerance = found and found.value, max(wanted.atol or 0.0, (wanted.rtol or 0.0) * abs(wanted.value))
         met = value is not None and abs(value - wanted.value) <= tolerance
-        return cls(wanted, dict(result.curve.varied), value, tolerance, met)
+        return cls(wanted, dict(result.parameter_set.varied), value, tolerance, met)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,37 +50,37 @@ class Checked:
     """What a check found.
 
     Attributes:
-        results: the curves, with what was compared alone; what did not converge is in their `failures`.
+        results: the parameter sets, with what was compared alone; what did not converge is in their `failures`.
         comparisons: what was expected beside what was computed.
     """
 
-    results: Sequence[CurveResult]
+    results: Sequence[SetResult]
     comparisons: Sequence[Comparison]
 
     @property
     def failures(self) -> tuple[Message, ...]:
-        """Why some p or indices of some curves are missing."""
+        """Why some p or summary numbers of some parameter sets are missing."""
         return tuple(failure.reason for result in self.results for failure in result.failures)
 
 
 def expected(case: Case, varied: Varied) -> Asked:
-    """What the expectations of a case compare, of the curve with these values."""
+    """What the expectations of a case compare, of the parameter set with these values."""
     chosen = [each for each in case.expect if each.selects(varied)]
     p = np.unique([each.p for each in chosen if each.p is not None])
     asked: dict[str, Settings] = {MOMENTS.name: {"p": p.tolist(), "slopes": False}}
-    asked |= {name: {} for name in INDICES if any(each.quantity == name for each in chosen)}
+    asked |= {name: {} for name in SUMMARY_NUMBERS if any(each.quantity == name for each in chosen)}
     if any(each.of_response for each in chosen):
         asked[RESPONSE] = {"rtol": case.response.rtol, "grid": None}
     return asked
 
 
-def compare(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
-    """Every expectation of a case against every curve that it selects."""
+def compare(case: Case, results: Sequence[SetResult]) -> list[Comparison]:
+    """Every expectation of a case against every parameter set that it selects."""
     return [
         Comparison.of(wanted, result)
         for wanted in case.expect
         for result in results
-        if wanted.selects(result.curve.varied)
+        if wanted.selects(result.parameter_set.varied)
     ]
 
 
@@ -90,7 +90,7 @@ def even_moments(case: Case) -> FloatArray:
 
 
 def refuse_no_hierarchy(case: Case) -> None:
-    """Refuse a case without an even p, or some curve of which has no hierarchy. Raises `FpsolveError`."""
+    """Refuse a case without an even p, or some parameter set of which has no hierarchy. Raises `FpsolveError`."""
     orders = even_moments(case)
     if case.method.by_moments:
         raise FpsolveError(
@@ -98,19 +98,19 @@ def refuse_no_hierarchy(case: Case) -> None:
         )
     if not orders.size:
         raise FpsolveError(f"{case.path}: moments.p: has no even p > 0, and the hierarchy is for these; add 2.0")
-    for curve in case.curves():
+    for parameter_set in case.sets():
         try:
-            refuse_open_hierarchy(curve.problem, float(orders.max()))
+            refuse_open_hierarchy(parameter_set.problem, float(orders.max()))
         except (NoHierarchy, ValueError) as failure:
-            place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
+            place = f"{case.path}: with {parameter_set.label}" if parameter_set.varied else str(case.path)
             raise FpsolveError(f"{place}: {said(failure)}") from None
 
 
-def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[Comparison]:
-    """Λ of the even p of every curve beside the hierarchy; they agree within the stated error and rounding."""
+def compare_with_hierarchy(case: Case, results: Sequence[SetResult]) -> list[Comparison]:
+    """Λ of the even p of every parameter set beside the hierarchy; they agree within the stated error and rounding."""
 
-    def comparison(result: CurveResult, p: float) -> Comparison:
-        known, found = even_moment(result.curve.problem, p), result.moment(p)
+    def comparison(result: SetResult, p: float) -> Comparison:
+        known, found = even_moment(result.parameter_set.problem, p), result.moment(p)
         error = known.error + (found.error_estimate if found else 0.0)
         wanted = Expectation(quantity="moment", p=p, value=known.value, atol=error, source=SOURCE)
         return Comparison.of(wanted, result)
@@ -118,6 +118,6 @@ def compare_with_hierarchy(case: Case, results: Sequence[CurveResult]) -> list[C
     return [comparison(result, p) for result in results for p in even_moments(case).tolist()]
 
 
-def compared(job: Job) -> CurveResult:
+def compared(job: Job) -> SetResult:
     """The task: solves a set, of which the result is small enough to send."""
-    return result_of(solve_set(job))
+    return result_of(attempt_set(job))

@@ -62,7 +62,7 @@ def wanted_of(
         start, stop: the ends of their ranges, one for each or none; from half to twice the value without them.
 
     Raises:
-        FpsolveError: nothing is wanted, it is none of this case, or the case has several curves.
+        FpsolveError: nothing is wanted, it is none of this case, or the case has several parameter sets.
     """
     if target is None or not by:
         text = '--for "stability_index = 1" --by oscillator.c1 --from -2 --to 0'

@@ -1,4 +1,4 @@
-"""What a curve is solved on: the discretisation of the p of the largest size."""
+"""What a parameter set is solved on: the discretisation of the p of the largest size."""
 
 from __future__ import annotations
 

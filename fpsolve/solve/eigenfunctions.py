@@ -25,7 +25,7 @@ ROUGH = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Eigenfunctions:
-    """What is written of a curve.
+    """What is written of a parameter set.
 
     Attributes:
         pairs: those at the p that are shown.
@@ -39,7 +39,7 @@ class Eigenfunctions:
 
 
 def shown_of(case: Case, number: int) -> Settings | None:
-    """The p that are shown of a curve, of the first also unasked, and whether its stationary density goes with them."""
+    """The p that are shown of a set, of the first also unasked, and whether its stationary density goes with them."""
     is_named = case.output.asks_for_eigenfunctions
     p = case.shown.tolist() if is_named or number == 1 else []
     has_density = is_named and not case.method.no_picture and (number == 1 or bool(p))
@@ -83,7 +83,7 @@ def _solve_directions(job: Job, settings: Settings) -> tuple[Message, ...]:
     for p in sorted({*shown, 0.0} if settings["density"] else shown):
         each = attempt(partial(_at, job.solver, p), DIRECTIONS.part)
         if isinstance(each, Reason):
-            said.append(Message(Code.INDEX_MISSING, symbols=["density of directions"], reason=each.message))
+            said.append(Message(Code.NUMBER_MISSING, symbols=["density of directions"], reason=each.message))
         else:
             found.append(each)
     job.pictures[DIRECTIONS.part] = tuple(found)

@@ -16,7 +16,7 @@ def _settings(case: Case, number: int) -> Settings | None:
 
 def _solve(job: Job, settings: Settings) -> Excursion:
     try:
-        check_start(job.curve.problem, settings["phi"], settings["xi"])
+        check_start(job.parameter_set.problem, settings["phi"], settings["xi"])
     except ValueError as error:  # of sets after the first one
         raise FpsolveError(str(error)) from None
     return solve_excursion(job.solver, phi=settings["phi"], xi=settings["xi"])

@@ -11,9 +11,9 @@ import numpy as np
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN, Spread, spread_of
 from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
-from fpsolve.exponent.quantities import INDICES, MOMENT
-from fpsolve.solve.curve import CurveResult
+from fpsolve.exponent.quantities import MOMENT, SUMMARY_NUMBERS
 from fpsolve.solve.question import Numbers, Question
+from fpsolve.solve.set_result import SetResult
 
 INTERVAL = f"{LEVEL:.0%} interval"
 """The heading of intervals in tables."""
@@ -21,43 +21,45 @@ INTERVAL = f"{LEVEL:.0%} interval"
 
 @dataclass(frozen=True)
 class Spreads:
-    """The spreads of a curve to first order.
+    """The spreads of a parameter set to first order.
 
     Attributes:
-        indices: by the names of λ and δ_p, without those that are not there.
+        summary_numbers: by the names of λ and δ_p, without those that are not there.
         moments: of Λ(p), by p, without those that are not there.
     """
 
-    indices: Mapping[str, Spread] = field(default_factory=dict)
+    summary_numbers: Mapping[str, Spread] = field(default_factory=dict)
     moments: Mapping[float, Spread] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
-        return bool(self.indices or self.moments)
+        return bool(self.summary_numbers or self.moments)
 
 
-def spreads_of(case: Case, result: CurveResult) -> Spreads:
-    """Those of a curve; empty where nothing is uncertain, or there are no sensitivities."""
+def spreads_of(case: Case, result: SetResult) -> Spreads:
+    """Those of a parameter set; empty where nothing is uncertain, or there are no sensitivities."""
     slopes = result.sensitivities
     if not case.uncertain or slopes is None:
         return Spreads()
-    laws = case.uncertain.laws(result.curve.problem)
-    indices = {
-        name: spread_of(each.value, slopes.indices.get(name, {}), laws)
+    laws = case.uncertain.laws(result.parameter_set.problem)
+    summary_numbers = {
+        name: spread_of(each.value, slopes.summary_numbers.get(name, {}), laws)
         for name in UNCERTAIN
         if (each := result.estimates[name]) is not None
     }
     rows = zip(slopes.p.tolist(), slopes.moments, strict=True)
     moments = {p: spread_of(each.value, row, laws) for p, row in rows if p and (each := result.moment(p))}
     return Spreads(
-        {name: each for name, each in indices.items() if each is not None},
+        {name: each for name, each in summary_numbers.items() if each is not None},
         {p: each for p, each in moments.items() if each is not None},
     )
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+def _numbers(case: Case, result: SetResult | None) -> Numbers:
     spreads = spreads_of(case, result) if result else Spreads()
     of_p = _ends([spreads.moments.get(p) for p in result.moments.p.tolist()] if result else [])
-    ends = {MOMENT: of_p} | {INDICES[name]: _ends([spreads.indices.get(name)])[:, 0] for name in UNCERTAIN}
+    ends = {MOMENT: of_p} | {
+        SUMMARY_NUMBERS[name]: _ends([spreads.summary_numbers.get(name)])[:, 0] for name in UNCERTAIN
+    }
     return {
         quantity.end(which, LEVEL): values
         for quantity, both in ends.items()

@@ -1,4 +1,4 @@
-"""Λ(p) of a curve at the p of its case, and of each of its blocks or rays."""
+"""Λ(p) of a parameter set at the p of its case, and of each of its blocks or rays."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import OF_MOMENTS
 from fpsolve.exponent.error import Failure, InvariantClass, Moment
 from fpsolve.exponent.solver import solve_moments
 from fpsolve.messages import Code, Message
 from fpsolve.model.quantity import MOMENT, OVER_P, RATE_FUNCTION
-from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import UNFINISHED, Job, Numbers, Numerics, Question, Settings
+from fpsolve.solve.set_result import SetResult
 from fpsolve.theory.perturbation import perturbed_moments, weak_noise_note
 
 
@@ -39,7 +39,7 @@ def _settings(case: Case, number: int) -> Settings:
 
 def _solve(job: Job, settings: Settings) -> Moments:
     """Λ(p), with errors of Λ′(p) if `slopes` says so, and with Λ′ that take a solve of their own if `every_slope`."""
-    problem, has_slopes = job.curve.problem, settings["slopes"]
+    problem, has_slopes = job.parameter_set.problem, settings["slopes"]
     known = {p: Moment(*row[:-1]) for p, row in job.rows.items()}
 
     def advance() -> None:
@@ -62,7 +62,7 @@ def _solve(job: Job, settings: Settings) -> Moments:
     return Moments(failures, (*found.warnings, *filter(None, notes)))
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+def _numbers(case: Case, result: SetResult | None) -> Numbers:
     known = vars(result.moments) if result else {}
     return {each: known.get(name) for name, each in OVER_P.items()} if MOMENT.name in case.asked else {}
 
@@ -78,7 +78,7 @@ QUESTION: Question = Question(
 )
 
 
-def _rates(case: Case, result: CurveResult | None) -> Numbers:
+def _rates(case: Case, result: SetResult | None) -> Numbers:
     is_asked = {MOMENT.name, RATE_FUNCTION.name} <= {*case.asked}
     return {RATE_FUNCTION: result.moments.rate_function if result else None} if is_asked else {}
 
@@ -91,11 +91,13 @@ def _solve_classes(job: Job, settings: Settings) -> tuple[InvariantClass, ...]:
     return job.solver.by_class(job.columns.p) if QUESTION.name in job.entries else ()
 
 
-def _said_of_classes(classes: Sequence[InvariantClass], curve: Curve, numerics: Numerics) -> Iterator[Message]:
+def _said_of_classes(
+    classes: Sequence[InvariantClass], parameter_set: ParameterSet, numerics: Numerics
+) -> Iterator[Message]:
     """That there are such classes, and their λ."""
     if len(classes) < 2:
         return
-    problem, rates = curve.problem, [each.lyapunov_exponent.value for each in classes]
+    problem, rates = parameter_set.problem, [each.lyapunov_exponent.value for each in classes]
     if classes[0].phase is None:
         is_hidden = not set(classes[0].variables) <= set(problem.linear.states)
         yield Message(

@@ -1,4 +1,4 @@
-"""Proofs of bounds on Λ(p), λ and δ_p of the curves of a case, and the check of one."""
+"""Proofs of bounds on Λ(p), λ and δ_p of the parameter sets of a case, and the check of one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import AfterValidator
 
 from fpsolve.analysis.target import said
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.errors import FpsolveError, NoSuchExponent
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.files import Unreadable, Words, read_text
@@ -19,12 +19,12 @@ from fpsolve.messages import Code, Message
 from fpsolve.proofs.balls import precision
 from fpsolve.proofs.certificate import NOTHING, Enclosure, MalformedProof, enclosure_of
 from fpsolve.proofs.claims import Claims, claims_from, verdicts
-from fpsolve.proofs.questions import IndexEnclosure, check_width, prove_bounds, prove_index
+from fpsolve.proofs.questions import StabilityIndexEnclosure, check_width, prove_bounds, prove_index
 from fpsolve.proofs.statement import statement_of
 from fpsolve.proofs.verify import objection
 from fpsolve.solve.records import key_of
 
-Answer: TypeAlias = Enclosure | IndexEnclosure
+Answer: TypeAlias = Enclosure | StabilityIndexEnclosure
 """Bounds that were found."""
 Question = partial[Any]
 """A function that finds bounds, with its arguments."""
@@ -35,19 +35,19 @@ _WORDS = Words("the proof", "a proof", "proof.json", "JSON", "make one with `fps
 
 
 @dataclass(frozen=True, eq=False)
-class CurveProof:
+class SetProof:
     """What is proven of one parameter set.
 
     Attributes:
         moments: p, and bounds on Λ(p) or None where that was not tried.
         exponent: bounds on λ; None where they are not asked for, or were not tried.
-        index: bounds on δ_p, or None as for λ.
+        stability_index: bounds on δ_p, or None as for λ.
     """
 
-    curve: Curve
+    parameter_set: ParameterSet
     moments: tuple[tuple[float, Enclosure | None], ...]
     exponent: Enclosure | None = None
-    index: IndexEnclosure | None = None
+    stability_index: StabilityIndexEnclosure | None = None
 
     @property
     def is_met(self) -> bool:
@@ -62,18 +62,18 @@ class CurveProof:
 
 
 def asked_of(case: Case) -> list[Any]:
-    """What is to be proven of every curve of a case: Λ at all p; λ and δ_p if [output] names them."""
+    """What is to be proven of every parameter set of a case: Λ at all p; λ and δ_p if [output] names them."""
     return [*case.p.tolist(), *(name for name in (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name) if name in case.asked)]
 
 
 def questions(case: Case, width: float | None) -> Iterator[Question]:
-    """For each curve those of what is asked, in its order.
+    """For each parameter set those of what is asked, in its order.
 
     Args:
         width: wanted upper − lower; a share of the scale if None.
     """
-    for curve in case.curves():
-        problem, stated = curve.problem, statement_of(curve.problem)
+    for parameter_set in case.sets():
+        problem, stated = parameter_set.problem, statement_of(parameter_set.problem)
         for each in asked_of(case):
             if each == STABILITY_INDEX.name:
                 yield partial(prove_index, problem, stated, budget=case.budget)
@@ -82,21 +82,21 @@ def questions(case: Case, width: float | None) -> Iterator[Question]:
                 yield partial(prove_bounds, problem, stated, p, width, budget=case.budget)
 
 
-def gathered(case: Case, answers: Sequence[Answer]) -> list[CurveProof]:
-    """What is proven of each curve, from the first answers, in the order of the questions."""
-    asked, left, found = asked_of(case), iter(answers), list[CurveProof]()
-    for curve in case.curves(stop=-(-len(answers) // len(asked))):
+def gathered(case: Case, answers: Sequence[Answer]) -> list[SetProof]:
+    """What is proven of each parameter set, from the first answers, in the order of the questions."""
+    asked, left, found = asked_of(case), iter(answers), list[SetProof]()
+    for parameter_set in case.sets(stop=-(-len(answers) // len(asked))):
         known: dict[Any, Any] = {each: next(left, None) for each in asked}
         moments = tuple((p, known[p]) for p in case.p.tolist())
-        found.append(CurveProof(curve, moments, *map(known.get, (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name))))
+        found.append(SetProof(parameter_set, moments, *map(known.get, (LYAPUNOV_EXPONENT.name, STABILITY_INDEX.name))))
     return found
 
 
 def refuse_unprovable_case(case: Case, width: float | None) -> None:
-    """Refuse a width that is not positive, and a case some curve of which cannot be proven.
+    """Refuse a width that is not positive, and a case some parameter set of which cannot be proven.
 
     Raises:
-        FpsolveError: with the curve and the reason.
+        FpsolveError: with the parameter set and the reason.
     """
     try:
         check_width(width)
@@ -106,11 +106,11 @@ def refuse_unprovable_case(case: Case, width: float | None) -> None:
         raise FpsolveError(
             f"{case.path}: moments: missing; proofs are of Λ(p), λ and δ_p; add [moments] with p = [2.0]"
         )
-    for curve in case.curves():
-        place = f"{case.path}: with {curve.label}" if curve.varied else str(case.path)
+    for parameter_set in case.sets():
+        place = f"{case.path}: with {parameter_set.label}" if parameter_set.varied else str(case.path)
         try:
             with precision():  # which raises `MissingFlint` before anything is written
-                statement_of(curve.problem)
+                statement_of(parameter_set.problem)
         except (TypeError, ValueError) as failure:
             raise FpsolveError(f"{place}: {said(failure)}") from None
         except NoSuchExponent as failure:

@@ -1,4 +1,4 @@
-"""A question: one thing that a case may ask for of each curve; and what becomes of it."""
+"""A question: one thing that a case may ask for of each parameter set; and what becomes of it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any, Generic, Literal, TypeVar
 import numpy as np
 
 from fpsolve.budget import Meter
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError, MeshError
 from fpsolve.exponent.elements import GivenMesh
@@ -28,26 +28,26 @@ from fpsolve.model.faults import shown
 from fpsolve.model.problem import Problem
 from fpsolve.model.quantity import MOMENT
 from fpsolve.signals import is_interrupt
-from fpsolve.solve.curve import CurveResult, MomentColumns, Number
+from fpsolve.solve.set_result import MomentColumns, Number, SetResult
 
 Settings = Mapping[str, Any]
-"""What is asked by a question, as JSON can hold it: with the curve and the `Numerics` it decides its numbers."""
+"""What is asked by a question, as JSON can hold it: with the set and the `Numerics` it decides its numbers."""
 Asked = Mapping[str, Settings]
-"""What is asked of a curve, by the names of questions."""
+"""What is asked of a parameter set, by the names of questions."""
 Limit = tuple[float, float]
 """Unknowns and seconds of a budget."""
 Numbers = Mapping[Quantity, Number]
-"""Those of a curve by their quantities, and their errors by those of these; None where there is none."""
+"""Those of a parameter set by their quantities, and their errors by those of these; None where there is none."""
 Found = TypeVar("Found")
 SOON = 1.0
-"""Seconds after which what is known of a curve is kept."""
+"""Seconds after which what is known of a parameter set is kept."""
 UNFINISHED = Message(Code.UNFINISHED)
 """What is said where some is not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
 class Numerics:
-    """How all curves of a case are solved.
+    """How all parameter sets of a case are solved.
 
     Attributes:
         rtol, budget, mesh: as for `moment_lyapunov`.
@@ -86,7 +86,7 @@ def refuse_mesh(case: Case) -> None:
     stated = case.mesh.model_dump(exclude_none=True)
     try:
         with np.errstate(all="ignore"):
-            method = Numerics.of(case).solver(next(case.curves()).problem).method if stated else None
+            method = Numerics.of(case).solver(next(case.sets()).problem).method if stated else None
             if isinstance(method, GivenMesh):
                 space, most = method.generators[0].chosen, case.budget.most(method.generators[0].chosen)
                 if space.size > most:
@@ -161,10 +161,10 @@ def idle(*_: object, **__: object) -> None:
 
 @dataclass(eq=False)
 class Job:
-    """The work on one curve: what is asked of it, and what is known of it by now.
+    """The work on one parameter set: what is asked of it, and what is known of it by now.
 
     Attributes:
-        curve: the parameter set.
+        parameter_set: the parameter set.
         asked: what is asked of it, by the names of questions.
         numerics: how it is solved.
         line: where it stands in a file of sets, for the message of one that cannot be solved.
@@ -177,7 +177,7 @@ class Job:
         keep: takes the job now and then, see `SOON`.
     """
 
-    curve: Curve
+    parameter_set: ParameterSet
     asked: Asked
     numerics: Numerics
     line: str = ""
@@ -192,13 +192,13 @@ class Job:
 
     @cached_property
     def meter(self) -> Meter:
-        """Of all numbers of the curve."""
+        """Of all numbers of the parameter set."""
         return self.numerics.budget.meter()
 
     @cached_property
     def solver(self) -> ExponentSolver:
         """The solver of Λ(p), which all questions share."""
-        return self.numerics.solver(self.curve.problem)
+        return self.numerics.solver(self.parameter_set.problem)
 
     @property
     def columns(self) -> MomentColumns:
@@ -235,18 +235,18 @@ class Job:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """One thing that a case may ask for of each curve.
+    """One thing that a case may ask for of each parameter set.
 
     Attributes:
         name: in a record and among the `parts` of a result.
-        asked: what a case asks of it for the curve with a number; None where it asks for nothing.
+        asked: what a case asks of it for the parameter set with a number; None where it asks for nothing.
         solve: finds it, or gives the `Reason` why there is none; None where it follows from others. Raises
             `FpsolveError`.
         kind: the type of what is found, which a record holds.
         symbol: what messages call it; empty where nobody is told why there is none.
         said: the messages about what was found.
         lacks: why some of what is asked for is not there.
-        numbers: those of a curve that a case asks for, by their quantities; of none, the quantities without numbers.
+        numbers: those of a set that a case asks for, by their quantities; of none, the quantities without numbers.
         draws: whether files show it of which no record holds the numbers, so that it is solved again for them.
     """
 
@@ -255,9 +255,9 @@ class Question:
     solve: Callable[[Job, Settings], Any] | None = None
     kind: Any = None
     symbol: str = ""
-    said: Callable[[Any, Curve, Numerics], Iterable[Message]] = lambda *_: ()
+    said: Callable[[Any, ParameterSet, Numerics], Iterable[Message]] = lambda *_: ()
     lacks: Callable[[Any, Settings], Iterable[Message]] = lambda *_: ()
-    numbers: Callable[[Case, CurveResult | None], Numbers] = lambda *_: {}
+    numbers: Callable[[Case, SetResult | None], Numbers] = lambda *_: {}
     draws: bool = False
 
     @property

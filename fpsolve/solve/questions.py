@@ -5,14 +5,14 @@ from __future__ import annotations
 from importlib import import_module
 
 from fpsolve.case.sections import PARTS
-from fpsolve.solve import discretisation, eigenfunctions, indices, intervals, moments
+from fpsolve.solve import discretisation, eigenfunctions, intervals, moments, summary_numbers
 from fpsolve.solve.question import Question
 
 QUESTIONS: tuple[Question, ...] = (
     moments.QUESTION,
     moments.RATES,
-    *indices.INDEX_QUESTIONS,
-    indices.THEORY,
+    *summary_numbers.SUMMARY_NUMBER_QUESTIONS,
+    summary_numbers.THEORY,
     moments.CLASSES,
     *(import_module(f"fpsolve.solve.{name}").QUESTION for name in PARTS),
     intervals.QUESTION,

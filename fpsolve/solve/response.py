@@ -1,4 +1,4 @@
-"""The stationary response of a curve with terms of degree 3, or of degree 0 with a delay."""
+"""The stationary response of a parameter set with terms of degree 3, or of degree 0 with a delay."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from fpsolve.exponent.forced import stationary_moments
 from fpsolve.exponent.method import Budget
 from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
-from fpsolve.solve.curve import CurveResponse, CurveResult, ResponseDensity, estimated
 from fpsolve.solve.question import Job, Numbers, Question, Settings
+from fpsolve.solve.set_result import ResponseDensity, SetResponse, SetResult, estimated
 
 if TYPE_CHECKING:
     from fpsolve.nonlinear.response import StationaryResponse
 
 
 MOST_GRIDS = 10
-"""Largest number of curves of which densities are written."""
+"""Largest number of parameter sets of which densities are written."""
 Grid = tuple[int, int, int]
 """How many amplitudes, phases and values of the noise."""
 SPREAD = 4.0
 """Standard deviations of the noise on each side of its mean in which its values lie."""
 
 
-def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> CurveResponse:
+def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Budget) -> SetResponse:
     """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
     if problem.linear.forced:
         moments = stationary_moments(problem, rtol)
         squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
         estimates = [Estimate(value, error, abs(value)) for value, error in squares]
-        return CurveResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
+        return SetResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
     from fpsolve.nonlinear.response import stationary_response  # 390 ms
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
-    return CurveResponse(
+    return SetResponse(
         found.means,
         found.impact_rate,
         found.balance,
@@ -71,7 +71,7 @@ def _values_of(noise: Noise, count: int) -> FloatArray:
 
 
 def _settings(case: Case, number: int) -> Settings | None:
-    """The tolerance of the response, which is its own, and the grid of its density if there are few curves."""
+    """The tolerance of the response, which is its own, and the grid of its density if there are few parameter sets."""
     if RESPONSE not in case.asked:
         return None
     grid = case.response.grid
@@ -79,12 +79,12 @@ def _settings(case: Case, number: int) -> Settings | None:
     return {"rtol": case.response.rtol, "grid": places}
 
 
-def _solve(job: Job, settings: Settings) -> CurveResponse:
+def _solve(job: Job, settings: Settings) -> SetResponse:
     grid = settings["grid"] and tuple(settings["grid"])
-    return solve_response(job.curve.problem, settings["rtol"], grid, job.numerics.budget)
+    return solve_response(job.parameter_set.problem, settings["rtol"], grid, job.numerics.budget)
 
 
-def _numbers(case: Case, result: CurveResult | None) -> Numbers:
+def _numbers(case: Case, result: SetResult | None) -> Numbers:
     about = case.problem.linear.response.numbers if RESPONSE in case.asked else {}
     found = result.response.numbers if result and result.response else {}
     return {key: value for name, each in about.items() for key, value in estimated(each, found.get(name)).items()}
@@ -94,7 +94,7 @@ QUESTION: Question = Question(
     RESPONSE,
     _settings,
     _solve,
-    CurveResponse,
+    SetResponse,
     RESPONSE,
     numbers=_numbers,
 )

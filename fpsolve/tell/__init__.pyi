@@ -2,9 +2,9 @@ from .blocks import Drawing as Drawing
 from .blocks import Grid as Grid
 from .blocks import Note as Note
 from .blocks import Sentence as Sentence
-from .curves import curve_grid as curve_grid
 from .pictures import draw_eigenfunction as draw_eigenfunction
 from .progress import Phase as Phase
 from .progress import Watch as Watch
 from .reports import page_of as page_of
+from .sets import set_grid as set_grid
 from .terminal import print_blocks as print_blocks

@@ -48,7 +48,7 @@ def _draw(case: Case, chart: Chart, paths: Sequence[Path], heading: str) -> None
     """The lines, their closed forms dotted, and the regions with names."""
     frame = charted(case).x, charted(case).y
     keys = [side.key for side in frame]
-    with figure_for(paths, heading, case.curve({}).held(case.units.time, keys), Format(height=4.0)) as figure:
+    with figure_for(paths, heading, case.parameter_set({}).fixed(case.units.time, keys), Format(height=4.0)) as figure:
         axes = figure.add_subplot()
         label_axes(axes, *(case.about(key).attributes for key in keys))
         for axis, side in zip((axes.xaxis, axes.yaxis), frame, strict=True):

@@ -38,7 +38,7 @@ from fpsolve.data import Quantity
 from fpsolve.errors import FpsolveError
 from fpsolve.exponent.kinds import choose
 from fpsolve.exponent.method import DIRECTIONS
-from fpsolve.exponent.quantities import INDICES, MOMENT
+from fpsolve.exponent.quantities import MOMENT, SUMMARY_NUMBERS
 from fpsolve.messages import message_of
 from fpsolve.model.equation import equations_of
 from fpsolve.model.faults import TableError
@@ -47,15 +47,15 @@ from fpsolve.model.problem import Problem, checked_problem
 from fpsolve.model.quantity import GROWTH
 from fpsolve.results.nodes import Nodes
 from fpsolve.solve.chart import Chart, begun_lines, solve_chart
-from fpsolve.solve.curve import CurveResult
 from fpsolve.solve.question import Job, Numerics, fault
-from fpsolve.solve.sets import everything, result_of, solve_curve
+from fpsolve.solve.set_result import SetResult
+from fpsolve.solve.sets import everything, result_of, solve_set
 from fpsolve.tell import solved as results
 from fpsolve.tell.blocks import Column, Drawing, Grid, Sentence
 from fpsolve.tell.chart import NAMED, show
 from fpsolve.tell.local import Answer, LocalPage, Question
 from fpsolve.tell.notes import notes
-from fpsolve.tell.numbers import indices, meaning, moment_grid, verdict
+from fpsolve.tell.numbers import meaning, moment_grid, summary_numbers, verdict
 from fpsolve.tell.progress import waiting
 from fpsolve.tell.reports import page_of, part_of_page
 from fpsolve.tell.text import sampled
@@ -76,7 +76,7 @@ BEYOND = 3.0
 """The same of a value of any sign."""
 NO_BOUND = 1e3
 """A bound from which on it keeps formulas from overflow, and tells nothing of what is usual."""
-NUMBERS = {MOMENT.name, *INDICES, "classes", "discretisation"}
+NUMBERS = {MOMENT.name, *SUMMARY_NUMBERS, "classes", "discretisation"}
 """The parts that are solved."""
 PIXELS = 144, 72
 """Of a picture, each way."""
@@ -90,12 +90,12 @@ class Explorer:
     """Answers to the pages that show a case; several pages do not know of each other.
 
     Args:
-        case: of its curves the first one is shown.
+        case: of its parameter sets the first one is shown.
         code: Python that makes its problem.
     """
 
     def __init__(self, case: Case, code: str) -> None:
-        first = next(case.curves(0, 1)).problem
+        first = next(case.sets(0, 1)).problem
         method, kinds = choose(first), CHEAP + CHEAP_OF_WALLS * bool(first.system.jumps)
         self.moves, has_square = method.is_quick, method.reason(2.0) is None
         more = USUAL_P if case.p.size < FEW and self.moves else FEWEST_P
@@ -223,14 +223,14 @@ class Explorer:
             raise FpsolveError(sentence)
         return self.case.model_copy(update={"system": problem.system, "noise": problem.noise})
 
-    def _solved(self, case: Case, *, is_moving: bool = False) -> CurveResult:
+    def _solved(self, case: Case, *, is_moving: bool = False) -> SetResult:
         """What `run` finds of a case; while a slider moves at fewer p, within a larger error."""
         asked = {name: settings for name, settings in everything(case).items() if name in NUMBERS}
         numerics = Numerics.of(case)
         if is_moving:
             asked[MOMENT.name] = {"p": self._few, "slopes": False}
             numerics = replace(numerics, rtol=max(numerics.rtol, MOVING_RTOL))
-        found = result_of(solve_curve(Job(next(case.curves()), asked, numerics)))
+        found = result_of(solve_set(Job(next(case.sets()), asked, numerics)))
         if not found.moments.p.size:
             raise FpsolveError(message_of(found.failures[0].reason))
         return found
@@ -246,7 +246,7 @@ class Explorer:
         found = self._solved(case)
         return {**self._told(case, found), "table": part_of_page([moment_grid(case, found)])}
 
-    def _told(self, case: Case, result: CurveResult) -> Answer:
+    def _told(self, case: Case, result: SetResult) -> Answer:
         """The curve, the equation, and what a report says of it."""
         moments, order = result.moments, np.argsort(result.moments.p)
         columns = moments.p, moments.value, moments.derivative, moments.error_estimate
@@ -257,7 +257,7 @@ class Explorer:
             "exponent": exponent.value if exponent else None,
             "equations": equations_of(case.system),
             "verdict": part_of_page([Sentence(verdict(case, result)), *meaning(result)]),
-            "numbers": part_of_page([*indices(case, result), *notes(case, [result], "")]),
+            "numbers": part_of_page([*summary_numbers(case, result), *notes(case, [result], "")]),
             "table": "",  # which nobody reads while a slider moves
         }
 
@@ -318,8 +318,8 @@ class Explorer:
 
     def _changed(self, case: Case) -> dict[str, float | str]:
         """The parameters with other values than in the file."""
-        held = self.source.problem.values
-        return {key: value for key, value in case.problem.values.items() if value != held[key]}
+        fixed = self.source.problem.values
+        return {key: value for key, value in case.problem.values.items() if value != fixed[key]}
 
 
 def _letters(latex: str) -> str:
@@ -507,7 +507,7 @@ def explore(problem: Problem | Case | str | Path) -> Explored:
     >>> page.close()
 
     Args:
-        problem: a motion and its noise; or a case, or its file, whose first curve is shown.
+        problem: a motion and its noise; or a case, or its file, whose first parameter set is shown.
 
     Raises:
         CaseError: with every fault of the file.

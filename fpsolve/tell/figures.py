@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import MOST_NAMED, Value, Varied, same
 from fpsolve.case.vary import legend, map_key
 from fpsolve.data import Quantity
@@ -34,10 +34,10 @@ from fpsolve.drawing import (
     scale_axis,
     scale_of,
 )
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, SUMMARY_NUMBERS
 from fpsolve.model.quantity import GROWTH, MOMENT, RATE_FUNCTION, STATUS, P
 from fpsolve.results.table import Table
-from fpsolve.solve.curve import CurveResult, SimulatedCurve, Status
+from fpsolve.solve.set_result import SetResult, SimulatedSet, Status
 from fpsolve.tell.blocks import Drawing
 from fpsolve.theory import perturbation
 from fpsolve.theory.perturbation import perturbed_moments
@@ -81,7 +81,7 @@ class Series:
 
 
 def coloured_by(varied: Sequence[Varied]) -> tuple[str | None, FloatArray]:
-    """The key whose value tells each of some curves from the others, and its values; without one their numbers."""
+    """The key whose value tells each of some sets from the others, and its values; without one their numbers."""
     for key, first in varied[0].items():
         values = [each[key] for each in varied]
         if not isinstance(first, str) and len(set(values)) == len(varied):
@@ -91,8 +91,8 @@ def coloured_by(varied: Sequence[Varied]) -> tuple[str | None, FloatArray]:
 
 def main_figure(
     case: Case,
-    results: Sequence[CurveResult],
-    simulated: Sequence[SimulatedCurve],
+    results: Sequence[SetResult],
+    simulated: Sequence[SimulatedSet],
     table: Table,
 ) -> Drawing:
     """figure.png and .pdf: finite elements, perturbation theory, dots of a simulation.
@@ -101,7 +101,7 @@ def main_figure(
     none of a case that does not ask for Λ(p).
 
     Args:
-        table: the numbers of all curves.
+        table: the numbers of all parameter sets.
     """
     setting, other = case.figure, map_key(case.figure, case.vary)
     over = "p" if setting.x == "p" else case.about(setting.x).words
@@ -120,7 +120,7 @@ def main_figure(
 
 def _draw(
     case: Case,
-    results: Sequence[CurveResult],
+    results: Sequence[SetResult],
     needed: str,
     draw: Callable[[Axes], None],
     paths: Sequence[Path],
@@ -128,13 +128,13 @@ def _draw(
 ) -> None:
     """A figure of all curves, if there are any and the case asks for it and for the quantity that it needs."""
     if case.output.figure and needed in case.asked and results:
-        held = results[0].curve.held(case.units.time, case.vary.keys)
-        with figure_for(paths, heading, held, FORMATS[case.figure.width]) as figure:
+        fixed = results[0].parameter_set.fixed(case.units.time, case.vary.keys)
+        with figure_for(paths, heading, fixed, FORMATS[case.figure.width]) as figure:
             draw(figure.add_subplot())
 
 
 def _draw_curves(
-    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], table: Table, axes: Axes
+    case: Case, results: Sequence[SetResult], simulated: Sequence[SimulatedSet], table: Table, axes: Axes
 ) -> None:
     setting = case.figure
     if setting.x == "p":
@@ -150,7 +150,7 @@ def _draw_curves(
     _mark(axes, series, colours)
 
 
-def rate_figure(case: Case, results: Sequence[CurveResult]) -> Drawing:
+def rate_figure(case: Case, results: Sequence[SetResult]) -> Drawing:
     """rate_function.png and .pdf, if the case asks for it: I(s) at s = Λ′(p) of every p, 0 at s = λ."""
 
     def draw(axes: Axes) -> None:
@@ -168,7 +168,7 @@ def _with_theory(case: Case, count: int) -> set[int]:
     return shown if case.figure.lines else set()
 
 
-def _moment_series(case: Case, result: CurveResult, *, with_theory: bool) -> Series:
+def _moment_series(case: Case, result: SetResult, *, with_theory: bool) -> Series:
     p = result.moments.p
     first, last = float(p.min(initial=math.inf)), float(p.max(initial=-math.inf))
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
@@ -177,72 +177,74 @@ def _moment_series(case: Case, result: CurveResult, *, with_theory: bool) -> Ser
         for each in (STABILITY_INDEX, LYAPUNOV_EXPONENT)
     )
     return Series(
-        dict(result.curve.varied),
+        dict(result.parameter_set.varied),
         p,
         result.moments.value,
         line,
-        perturbed_moments(result.curve.problem, line),
+        perturbed_moments(result.parameter_set.problem, line),
         root if root is not None and first <= root <= last else None,
         slope if first <= 0 <= last else None,
     )
 
 
-def _rates(result: CurveResult, *, with_theory: bool) -> Series:
+def _rates(result: SetResult, *, with_theory: bool) -> Series:
     """I over s, beside the parabola (s − λ)²/2Λ″(0) of perturbation theory."""
     found = result.moments
-    theory = perturbation.second_order_or_none(result.curve.problem) if found.p.size else None
+    theory = perturbation.second_order_or_none(result.parameter_set.problem) if found.p.size else None
     known = np.isfinite(found.derivative)
     s, line, values = found.derivative[known], _NOTHING, _NOTHING
     if with_theory and theory and theory.variance_rate and s.size:
         line = np.linspace(s.min(), s.max(), 200)
         values = (line - theory.lyapunov_exponent) ** 2 / (2 * theory.variance_rate)
-    return Series(dict(result.curve.varied), s, found.rate_function[known], line, values)
+    return Series(dict(result.parameter_set.varied), s, found.rate_function[known], line, values)
 
 
-def _over_parameter(case: Case, results: Sequence[CurveResult], numbers: FloatArray) -> list[Series]:
+def _over_parameter(case: Case, results: Sequence[SetResult], numbers: FloatArray) -> list[Series]:
     """A number over the parameter: one series for each set of the other parameters that vary."""
     key = case.figure.x
-    groups: dict[tuple[tuple[str, Value], ...], list[Curve]] = {}
+    groups: dict[tuple[tuple[str, Value], ...], list[ParameterSet]] = {}
     for result in results:
-        others = tuple((name, value) for name, value in result.curve.varied.items() if name != key)
-        groups.setdefault(others, []).append(result.curve)
+        others = tuple((name, value) for name, value in result.parameter_set.varied.items() if name != key)
+        groups.setdefault(others, []).append(result.parameter_set)
     shown, found = _with_theory(case, len(groups)), []
-    for i, (others, curves) in enumerate(groups.items()):
-        x = np.array([curve.varied[key] for curve in curves], dtype=float)
+    for i, (others, sets) in enumerate(groups.items()):
+        x = np.array([each.varied[key] for each in sets], dtype=float)
         line = (np.geomspace if x.min() > 0 else np.linspace)(x.min(), x.max(), 200) if i in shown else _NOTHING
-        theory = [_theory(case, case.curve({**dict(others), key: float(each)})) for each in line]
-        found.append(Series(dict(others), x, numbers[[curve.number - 1 for curve in curves]], line, np.array(theory)))
+        theory = [_theory(case, case.parameter_set({**dict(others), key: float(each)})) for each in line]
+        found.append(Series(dict(others), x, numbers[[each.number - 1 for each in sets]], line, np.array(theory)))
     return found
 
 
-def _dots(case: Case, simulated: Sequence[SimulatedCurve]) -> FloatArray:
-    """The same of all simulated curves: x, y and the standard errors of y, shape (3, n)."""
+def _dots(case: Case, simulated: Sequence[SimulatedSet]) -> FloatArray:
+    """The same of all simulated parameter sets: x, y and the standard errors of y, shape (3, n)."""
     x, p, found = case.figure.x, case.figure.moment, list[tuple[Value | None, ...]]()
     for each in simulated:
         if x != "p" and p is None:
-            found.append((each.curve.varied[x], *each.estimates.get(case.figure.needed, (None, None))))
+            found.append((each.parameter_set.varied[x], *each.estimates.get(case.figure.needed, (None, None))))
         else:
             wanted = [one for one in each.result.estimates if p is None or same(one.p, p)]
-            found += [(one.p if x == "p" else each.curve.varied[x], one.value, one.standard_error) for one in wanted]
+            found += [
+                (one.p if x == "p" else each.parameter_set.varied[x], one.value, one.standard_error) for one in wanted
+            ]
     return np.array([each for each in found if None not in each], dtype=float).reshape(-1, 3).T
 
 
 def _numbers(case: Case, table: Table) -> FloatArray:
-    """What a figure over parameters shows of each curve; NaN where there is none."""
+    """What a figure over parameters shows of each parameter set; NaN where there is none."""
     found = table[case.figure.needed].values
     if case.figure.moment is None:
         return found
     return found[:, int(np.argmin(abs(case.p - case.figure.moment)))]  # which is among them, but for its last digits
 
 
-def _theory(case: Case, curve: Curve) -> float:
-    if not curve.is_possible:
+def _theory(case: Case, parameter_set: ParameterSet) -> float:
+    if not parameter_set.is_possible:
         return math.nan
     if case.figure.moment is not None:
-        return float(perturbed_moments(curve.problem, np.array(case.figure.moment)))
-    index = INDICES[case.figure.needed]
-    value = index.theory(curve.problem)
-    return value if index.interval[0] <= value <= index.interval[1] else math.nan
+        return float(perturbed_moments(parameter_set.problem, np.array(case.figure.moment)))
+    quantity = SUMMARY_NUMBERS[case.figure.needed]
+    value = quantity.theory(parameter_set.problem)
+    return value if quantity.interval[0] <= value <= quantity.interval[1] else math.nan
 
 
 def draw_series(
@@ -353,7 +355,9 @@ def _draw_map(case: Case, table: Table, keys: tuple[str, str], axes: Axes) -> No
         cells.set(hatch="/////", edgecolor="0.45", linewidth=0)
         axes.fill([], [], facecolor="white", edgecolor="0.45", hatch="/////", label="failed or not solved")
     if (np.isnan(values) & ~failed).any():
-        sought = "" if setting.moment is not None else " from {:g} to {:g}".format(*INDICES[setting.needed].interval)
+        sought = (
+            "" if setting.moment is not None else " from {:g} to {:g}".format(*SUMMARY_NUMBERS[setting.needed].interval)
+        )
         axes.set_facecolor("0.8")
         axes.fill([], [], color="0.8", label=f"no {setting.quantity.words}{sought}")
     limits = setting.xlim, setting.ylim

@@ -1,4 +1,4 @@
-"""The numbers of a curve as a terminal and a report say them, and what they say of stability."""
+"""The numbers of a parameter set as a terminal and a report say them, and what they say of stability."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from fpsolve.exponent.error import Estimate, digits
 from fpsolve.exponent.quantities import (
     CRITICAL_IMPACT_FACTOR,
     CRITICAL_RESTITUTION,
-    INDICES,
     LYAPUNOV_EXPONENT,
     MOMENT,
     OF_IMPACTS,
     STABILITY_INDEX,
+    SUMMARY_NUMBERS,
     VARIANCE_RATE,
-    Index,
+    SummaryNumber,
 )
 from fpsolve.messages import Code, message_of
 from fpsolve.model.coordinates import infinite
 from fpsolve.model.quantity import MEAN_SQUARE, ResponseQuantities
 from fpsolve.results.table import Table
-from fpsolve.solve.curve import CurveResponse, CurveResult
 from fpsolve.solve.intervals import INTERVAL, spreads_of
+from fpsolve.solve.set_result import SetResponse, SetResult
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence, filled
 from fpsolve.tell.text import (
     EACH,
@@ -45,27 +45,27 @@ from fpsolve.tell.text import (
 )
 
 
-def told_indices(case: Case) -> list[Index]:
-    """The indices that a case asks for, without those of impacts where it names none, and not one ray has them."""
-    has_impacts = len(case.system.jumps) == 1 or case.output.lists_quantities
-    return [index for name, index in INDICES.items() if name in case.asked and (has_impacts or name not in OF_IMPACTS)]
+def told_summary_numbers(case: Case) -> list[SummaryNumber]:
+    """Those that a case asks for, without those of impacts where it names none, and not one ray has them."""
+    left_out = () if len(case.system.jumps) == 1 or case.output.lists_quantities else OF_IMPACTS
+    return [each for name, each in SUMMARY_NUMBERS.items() if name in case.asked and name not in left_out]
 
 
-def index_text(index: Index, result: CurveResult, most: int = 17) -> str:
-    """An index of a curve with its digits, or that there is none, or that it was not found out."""
-    estimate = result.estimates[index.name]
+def summary_number_text(quantity: SummaryNumber, result: SetResult, most: int = 17) -> str:
+    """A summary number of a parameter set with its digits, or that there is none, or that it was not found out."""
+    estimate = result.estimates[quantity.name]
     if estimate is not None:
         return digits(estimate.value, estimate.error_estimate, most)
     told = map(message_of, (*(failure.reason for failure in result.failures), *result.warnings))
-    unsolved = {Code.INDEX_FAILED, Code.INDEX_MISSING} if result.failures else {Code.INDEX_FAILED}
-    if any(each.code in unsolved and index.symbol in each.data["symbols"] for each in told):
+    unsolved = {Code.NUMBER_FAILED, Code.NUMBER_MISSING} if result.failures else {Code.NUMBER_FAILED}
+    if any(each.code in unsolved and quantity.symbol in each.data["symbols"] for each in told):
         return "not solved"
-    if index in (STABILITY_INDEX, VARIANCE_RATE) and infinite(result.curve.problem, 1.0, index.symbol):
+    if quantity in (STABILITY_INDEX, VARIANCE_RATE) and infinite(result.parameter_set.problem, 1.0, quantity.symbol):
         return "not computed"
-    return "none" if index == CRITICAL_RESTITUTION else "none found"
+    return "none" if quantity == CRITICAL_RESTITUTION else "none found"
 
 
-def indices(case: Case, result: CurveResult) -> Iterator[Block]:
+def summary_numbers(case: Case, result: SetResult) -> Iterator[Block]:
     """λ, δ_p, Λ(2) and what else is asked for, that of impacts for each ray; not where a figure is over a parameter."""
     if case.figure.x != "p":
         return
@@ -78,10 +78,10 @@ def indices(case: Case, result: CurveResult) -> Iterator[Block]:
         held = interval(spread.low, spread.high) if spread else ""
         rows.append([words, symbol, number or instead, *more, closed, held])
 
-    for index in told_indices(case):
-        found = result.estimates[index.name]
-        theory = index.theory(result.curve.problem) if found else math.nan
-        tell(index, found, index_text(index, result), theory, spreads.indices.get(index.name))
+    for quantity in told_summary_numbers(case):
+        found = result.estimates[quantity.name]
+        theory = quantity.theory(result.parameter_set.problem) if found else math.nan
+        tell(quantity, found, summary_number_text(quantity, result), theory, spreads.summary_numbers.get(quantity.name))
     if square := result.moment(2.0):
         [closed] = result.moments.perturbation[result.moments.p == 2]
         tell(MEAN_SQUARE, square, "", closed, spreads.moments.get(2.0))
@@ -89,14 +89,14 @@ def indices(case: Case, result: CurveResult) -> Iterator[Block]:
         yield filled("", [*NUMBER_COLUMNS, Column("perturbation theory", 3), Column(INTERVAL, 1)], rows)
 
 
-def excursions(case: Case, result: CurveResult) -> Iterator[Sentence]:
+def excursions(case: Case, result: SetResult) -> Iterator[Sentence]:
     """What is known of P(sup ‖x‖ ≥ A) for every level, with the start and the norm."""
     found = result.excursion
     if not found or not (told := [text for level in case.excursions.levels if (text := _bounded(found, level))]):
         return
     phi = "uniform φ₀" if isinstance(found.phi, str) else f"φ₀ = {found.phi:.6g}"
     start = f"{phi}, {'stationary noise' if isinstance(found.xi, str) else f'ξ₀ = {found.xi:.6g}'}"
-    norm = f"‖x‖ is the length of ({', '.join(result.curve.problem.linear.states)})"
+    norm = f"‖x‖ is the length of ({', '.join(result.parameter_set.problem.linear.states)})"
     yield Sentence(f"Start with {start}: {', '.join(told)}; {norm}, and ‖x₀‖ = 1.")
 
 
@@ -124,18 +124,18 @@ def _rounded(bound: float, side: int) -> str:
     return f"{(math.floor if side < 0 else math.ceil)(bound / step) * step:.3g}"
 
 
-def response(case: Case, result: CurveResult) -> Iterator[Block]:
+def response(case: Case, result: SetResult) -> Iterator[Block]:
     """The means and the impacts with their errors, and where the densities are largest."""
     found, about = result.response, case.problem.linear.response
     if found is None:
         return
     rows = [row_of(about.numbers[name], each, case.units.time) for name, each in found.numbers.items()]
-    yield filled(f"Stationary response{result.curve.of}", NUMBER_COLUMNS, rows)
+    yield filled(f"Stationary response{result.parameter_set.of}", NUMBER_COLUMNS, rows)
     if found.balance is not None:
         yield Sentence(shape(found, about))
 
 
-def shape(found: CurveResponse, about: ResponseQuantities) -> str:
+def shape(found: SetResponse, about: ResponseQuantities) -> str:
     """Where the densities of a response are largest: what changes at δ_p = −1 and −2, the P-bifurcations."""
     both = about.joint_symbol
     if not found.has_hump:
@@ -148,10 +148,10 @@ STAR = "* for the noise reduced by Eqs. (12)-(14)"
 """The remark on perturbation theory of another noise than that which is solved."""
 
 
-def moment_grid(case: Case, result: CurveResult) -> Grid:
+def moment_grid(case: Case, result: SetResult) -> Grid:
     """Λ(p) at each p, with its error, its interval, and perturbation theory."""
     found, spreads = result.moments, spreads_of(case, result).moments
-    closed_form = f"Eq. {MOMENT.closed_form}{'*' if result.curve.noise.approximates_spectrum else ''}"
+    closed_form = f"Eq. {MOMENT.closed_form}{'*' if result.parameter_set.noise.approximates_spectrum else ''}"
     columns = Column("p"), Column(MOMENT.symbol), Column("± error"), Column(INTERVAL), Column("P(Λ < 0)")
     more = Column(f"perturbation, {closed_form}", 1), Column("difference", 2)
     rows, has_theory = list[list[str]](), any(map(math.isfinite, found.perturbation))
@@ -180,11 +180,11 @@ TREATED = {
 """What the noise is, by its treatment."""
 
 
-def verdicts(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Sentence]:
+def verdicts(case: Case, results: Sequence[SetResult], table: Table) -> Iterator[Sentence]:
     """Of which noise (7) the numbers are, and what becomes of almost every path and of the mean square.
 
     Args:
-        table: the numbers of all curves.
+        table: the numbers of all parameter sets.
     """
     yield Sentence("", case.headline)
     for key, stated in case.parameters.items():
@@ -197,13 +197,13 @@ def verdicts(case: Case, results: Sequence[CurveResult], table: Table) -> Iterat
     else:
         for each in results:
             if text := verdict(case, each):
-                yield Sentence(f"{each.curve.label}: {text[0].lower()}{text[1:]}" if len(results) > 1 else text)
+                yield Sentence(f"{each.parameter_set.label}: {text[0].lower()}{text[1:]}" if len(results) > 1 else text)
     if len(signs) == 2 and ((signs[PATH] < 0) & (signs[SQUARE] > 0)).any():
         yield Sentence(BURSTS)
 
 
 def _signs(case: Case, table: Table) -> dict[str, FloatArray]:
-    """Those of λ and Λ(2) of all curves, as far as a case asks for them; 0 where an error leaves one open."""
+    """Those of λ and Λ(2) of all parameter sets, as far as a case asks for them; 0 where an error leaves one open."""
     found = dict[str, FloatArray]()
     for what, name in ((PATH, LYAPUNOV_EXPONENT.name), (SQUARE, MOMENT.name)):
         if name in table and (what == PATH or 2 in case.p):
@@ -213,11 +213,11 @@ def _signs(case: Case, table: Table) -> dict[str, FloatArray]:
     return found
 
 
-def verdict(case: Case, result: CurveResult) -> str:
-    """The verdict on a curve: "Almost every path decays, halving in a time of 40; the mean square grows, ..."."""
+def verdict(case: Case, result: SetResult) -> str:
+    """The verdict on a set: "Almost every path decays, halving in a time of 40; the mean square grows, ..."."""
     spreads, told = spreads_of(case, result), list[str]()
     for what, rate, spread in (
-        (PATH, result.lyapunov_exponent, spreads.indices.get(LYAPUNOV_EXPONENT.name)),
+        (PATH, result.lyapunov_exponent, spreads.summary_numbers.get(LYAPUNOV_EXPONENT.name)),
         (SQUARE, result.moment(2.0), spreads.moments.get(2.0)),
     ):
         if spread:
@@ -226,7 +226,7 @@ def verdict(case: Case, result: CurveResult) -> str:
             told.append(fate(what, rate.value, sign := sign_of(rate.value, rate.error_estimate), case.units.time))
             if what == PATH and sign > 0:
                 settles = ", and settles into the stationary response" * (result.response is not None)
-                is_bounded = result.curve.problem.linear.cubic
+                is_bounded = result.parameter_set.problem.linear.cubic
                 told[0] += f" near rest{settles}" if is_bounded else ", without bound"
     return _sentence(told)
 
@@ -236,7 +236,7 @@ def _sentence(told: Sequence[str]) -> str:
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
-def meaning(result: CurveResult) -> Iterator[Sentence]:
+def meaning(result: SetResult) -> Iterator[Sentence]:
     """What δ_p and R_c say, if they are there."""
     index, critical = result.stability_index, result.estimates[CRITICAL_IMPACT_FACTOR.name]
     if index:

@@ -1,4 +1,4 @@
-"""Pictures of one curve: of its response, of what its parameters do, of its densities over directions, of T."""
+"""Pictures of one parameter set: of its response, of what its parameters do, of its densities over directions, of T."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fpsolve.arrays import FloatArray, shown
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import RESPONSE, SENSITIVITIES
 from fpsolve.data import Quantity
 from fpsolve.drawing import MOST_LINES, QUARTERS, Format, draw_bars, draw_colours, draw_dots, figure_for, label_axes
@@ -25,8 +25,8 @@ from fpsolve.model.quantity import MOMENT, PHASE
 from fpsolve.results.directions import directions_file
 from fpsolve.results.nodes import FIELDS, Nodes
 from fpsolve.results.vtk import name_at
-from fpsolve.solve.curve import CurveResult, SimulatedCurve
 from fpsolve.solve.question import Numerics
+from fpsolve.solve.set_result import SetResult, SimulatedSet
 from fpsolve.tell.blocks import Drawing
 from fpsolve.theory.perturbation import scale_of
 
@@ -43,24 +43,24 @@ DECADES = 2
 Field = Literal["T", "T_adjoint", "tilted_density"]
 
 
-def _of_response(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
+def _of_response(case: Case, result: SetResult, folder: Path, simulated: SimulatedSet | None) -> Iterator[Drawing]:
     """response.png and .pdf, where there are densities: of both variables, of the amplitude, and what they do at rest.
 
     Beside that of the amplitude stands a simulated one, where there is one.
     """
-    found, curve = result.response, result.curve
+    found, parameter_set = result.response, result.parameter_set
     if not (case.output.figure and found and (density := found.density)):
         return
 
     def draw(paths: Sequence[Path], heading: str) -> None:
-        motion = curve.problem.linear
+        motion = parameter_set.problem.linear
         of, a = motion.response, density.amplitude[:, None]
         phi, of_plane = density.plane(of.has_wall)
         quantities = of.first, of.second, of.density, of.amplitude, of.amplitude_density
         x, v, of_both, amplitude, of_amplitude = (each.timed(case.units.time).attributes for each in quantities)
         most = float(density.of_plane.max())
         least = 1e-4 * most  # what is below has its colour
-        with figure_for(paths, heading, curve.held(case.units.time), Format(width=10.5)) as figure:
+        with figure_for(paths, heading, parameter_set.fixed(case.units.time), Format(width=10.5)) as figure:
             plane, radial = figure.subplots(1, 2)
             places, shown = (a * np.cos(phi), -motion.aspect * a * np.sin(phi)), np.maximum(of_plane, least)
             draw_colours(plane, *places, shown, of_both, norm="log", vmin=least, vmax=most, shading="gouraud")
@@ -76,7 +76,7 @@ def _of_response(case: Case, result: CurveResult, folder: Path, simulated: Simul
                 dots = middles, sample.amplitude_density, sample.amplitude_error
                 draw_dots(radial, *dots, label="Monte Carlo ± 2 standard errors", marker=".", color="black")
 
-    yield Drawing(f"Stationary response{curve.of}", draw, f"response{curve.suffix}", case.headline)
+    yield Drawing(f"Stationary response{parameter_set.of}", draw, f"response{parameter_set.suffix}", case.headline)
 
 
 def _at_rest(words: str, index: float | None, limit: int) -> str:
@@ -86,46 +86,48 @@ def _at_rest(words: str, index: float | None, limit: int) -> str:
     return rf"{words if below else 'infinite at rest'}: $\delta_p = {index:.3g} {'<' if below else '>'} {limit}$"
 
 
-def _of_sensitivities(
-    case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None
-) -> Iterator[Drawing]:
+def _of_sensitivities(case: Case, result: SetResult, folder: Path, simulated: SimulatedSet | None) -> Iterator[Drawing]:
     """sensitivities.png and .pdf, if the case asks for them: θ ∂/∂θ of λ and of some Λ(p), scaled."""
-    curve, found = result.curve, result.sensitivities
+    parameter_set, found = result.parameter_set, result.sensitivities
     if not (case.output.sensitivities and found):
         return
 
     def draw(paths: Sequence[Path], heading: str) -> None:
-        scale, bars = scale_of(curve.problem), dict[str, list[float]]()
+        scale, bars = scale_of(parameter_set.problem), dict[str, list[float]]()
         for label, (p, slopes) in found.shown().items():
             size = float(scale.moment(p)) if p else scale.linear
             bars[label] = [found.theta[key] * slopes[key].value / size for key in slopes]
-        with figure_for(paths, heading, curve.held(case.units.time)) as figure:
+        with figure_for(paths, heading, parameter_set.fixed(case.units.time)) as figure:
             words = r"effect of a relative change, $\theta\,\partial/\partial\theta$, over the scale"
             draw_bars(figure.add_subplot(xlabel=words), bars, [case.about(key).shown for key in found.theta])
 
-    yield Drawing(f"Effect of the parameters{curve.of}", draw, f"sensitivities{curve.suffix}", case.headline)
+    yield Drawing(
+        f"Effect of the parameters{parameter_set.of}", draw, f"sensitivities{parameter_set.suffix}", case.headline
+    )
 
 
 MOST_PANELS = 4
 """Of a figure: the stationary density, and tilted ones."""
 
 
-def _of_directions(case: Case, result: CurveResult, folder: Path, _: SimulatedCurve | None) -> Iterator[Drawing]:
+def _of_directions(case: Case, result: SetResult, folder: Path, _: SimulatedSet | None) -> Iterator[Drawing]:
     """densities.png and .pdf, where densities were written."""
-    curve, source = result.curve, directions_file(result.curve, folder)
+    parameter_set, source = result.parameter_set, directions_file(result.parameter_set, folder)
     if case.output.figure and case.method.pictures == DIRECTIONS and source.is_file():
-        grid = direction_grid(curve.problem, 2)
+        grid = direction_grid(parameter_set.problem, 2)
         what = f"energy share and {grid.quantities[1].name.replace('_', ' ')}" if grid.share else "directions"
-        title, job = f"Densities of {what}{curve.of}", partial(_draw_directions, case, curve, source)
-        yield Drawing(title, job, f"densities{curve.suffix}", case.headline)
+        title, job = f"Densities of {what}{parameter_set.of}", partial(_draw_directions, case, parameter_set, source)
+        yield Drawing(title, job, f"densities{parameter_set.suffix}", case.headline)
 
 
-def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Path], heading: str) -> None:
+def _draw_directions(
+    case: Case, parameter_set: ParameterSet, source: Path, paths: Sequence[Path], heading: str
+) -> None:
     """The stationary density, and some tilted ones."""
     import xarray  # with pandas, which takes 180 ms
 
     found = xarray.load_dataset(source, engine="h5netcdf")
-    grid = direction_grid(curve.problem, min(found["T"].shape[1:]))
+    grid = direction_grid(parameter_set.problem, min(found["T"].shape[1:]))
     panels = []
     if "stationary_density" in found:
         panels.append(("stationary", found["stationary_density"]))
@@ -136,7 +138,7 @@ def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Pat
     columns = min(len(panels), 2)
     rows = -(-len(panels) // columns)
     form = Format(width=5.8 * columns, height=3.0, scale=1.1)
-    with figure_for(paths, heading, curve.held(case.units.time), form) as figure:
+    with figure_for(paths, heading, parameter_set.fixed(case.units.time), form) as figure:
         for place, (words, values) in enumerate(panels, 1):
             axes = figure.add_subplot(rows, columns, place)
             grid.draw(axes, values.values, {"long_name": "density", "units": grid.unit}, vmin=0.0)
@@ -145,18 +147,18 @@ def _draw_directions(case: Case, curve: Curve, source: Path, paths: Sequence[Pat
 
 
 def _of_eigenfunctions(
-    case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None
+    case: Case, result: SetResult, folder: Path, simulated: SimulatedSet | None
 ) -> Iterator[Drawing]:
     """A picture at one p for a page, where the eigenfunction was written."""
-    curve, p = result.curve, case.usual_p
-    is_there = case.shown.size and (folder / name_at(f"eigenfunctions{curve.suffix}", p)).is_file()
+    parameter_set, p = result.parameter_set, case.usual_p
+    is_there = case.shown.size and (folder / name_at(f"eigenfunctions{parameter_set.suffix}", p)).is_file()
     if case.method.pictures == PHASE_AND_NOISE and is_there:
-        title = f"Eigenfunction T(φ, ξ) of p = {p:g}{curve.of}"
-        yield Drawing(title, partial(_draw_eigenfunction, case, curve, p))
+        title = f"Eigenfunction T(φ, ξ) of p = {p:g}{parameter_set.of}"
+        yield Drawing(title, partial(_draw_eigenfunction, case, parameter_set, p))
 
 
-def _draw_eigenfunction(case: Case, curve: Curve, p: float, paths: Sequence[Path], heading: str) -> None:
-    _draw_pair(Numerics.of(case).solver(curve.problem).pair(p), "T", "viridis", case.units.time, paths)
+def _draw_eigenfunction(case: Case, parameter_set: ParameterSet, p: float, paths: Sequence[Path], heading: str) -> None:
+    _draw_pair(Numerics.of(case).solver(parameter_set.problem).pair(p), "T", "viridis", case.units.time, paths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,4 +271,4 @@ FIGURES = {
     PHASE_AND_NOISE.part: _of_eigenfunctions,
     DIRECTIONS.part: _of_directions,
 }
-"""Of a curve in a folder, beside its simulation if there is one, by the names of the questions they answer."""
+"""Of a parameter set in a folder, beside its simulation if there is one, by the names of the questions they answer."""

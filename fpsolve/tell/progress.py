@@ -56,7 +56,7 @@ class Watch:
         noted: takes what limits this.
         said: takes notes about files.
         has_report: whether a report is written, too.
-        is_whole: whether a few of several curves are also shown one by one, with Λ at each p.
+        is_whole: whether a few of several parameter sets are also shown one by one, with Λ at each p.
     """
 
     bar: Callable[[Phase], AbstractContextManager[Advance]] = lambda _: nullcontext(idle)

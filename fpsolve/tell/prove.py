@@ -10,10 +10,10 @@ from fpsolve.case.case import Case
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX
 from fpsolve.proofs.certificate import Enclosure
 from fpsolve.proofs.claims import verdicts
-from fpsolve.proofs.questions import IndexEnclosure
-from fpsolve.solve.prove import CurveProof
+from fpsolve.proofs.questions import StabilityIndexEnclosure
+from fpsolve.solve.prove import SetProof
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence
-from fpsolve.tell.curves import Cells, grid_of
+from fpsolve.tell.sets import Cells, grid_of
 from fpsolve.tell.text import EACH, PROOFS, ROWS
 
 NOT_PROVEN = "not proven"
@@ -22,13 +22,13 @@ FATES = {1: "grows", -1: "decays", 0: "open"}
 """The fate of a path or a moment by the sign of its exponent."""
 
 
-def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
+def show(case: Case, proofs: Sequence[SetProof]) -> Iterator[Block]:
     """The bounds and what follows from them."""
     if len(proofs) > EACH:
         yield proofs_grid(case, proofs)
         return
     for proof in proofs:
-        yield Sentence("", case.heading(proof.curve))
+        yield Sentence("", case.heading(proof.parameter_set))
         told = proof.verdicts
         if sum(found is not None and found.sign != 0 for _, found in proof.moments) > PROOFS:
             path = verdicts([], 0 if proof.exponent is None else proof.exponent.sign)
@@ -38,16 +38,18 @@ def show(case: Case, proofs: Sequence[CurveProof]) -> Iterator[Block]:
         yield proof_grid(proof)
 
 
-def proof_grid(proof: CurveProof) -> Grid:
+def proof_grid(proof: SetProof) -> Grid:
     """The bounds on Λ at each p, λ and δ_p, how far they are apart, and what the moment or almost every path does."""
     columns = [Column("quantity"), Column("≥"), Column("≤"), Column("width", 2), Column("what it says", 1)]
     grid = Grid("", columns)
-    bounds: list[tuple[str, Enclosure | IndexEnclosure | None, str]]
+    bounds: list[tuple[str, Enclosure | StabilityIndexEnclosure | None, str]]
     bounds = [(f"Λ({p:.10g})", found, _fate(p, found)) for p, found in proof.moments]
     if (path := proof.exponent) is not None:
         bounds.append((LYAPUNOV_EXPONENT.symbol, path, FATES[path.sign] if path.is_proven else NOT_PROVEN))
-    if proof.index is not None:
-        bounds.append((STABILITY_INDEX.symbol, proof.index, "" if proof.index.is_proven else NOT_PROVEN))
+    if proof.stability_index is not None:
+        bounds.append(
+            (STABILITY_INDEX.symbol, proof.stability_index, "" if proof.stability_index.is_proven else NOT_PROVEN)
+        )
     for symbol, found, fate in bounds:
         row = ["", "", ""]
         if found is not None and found.is_proven:
@@ -59,10 +61,10 @@ def proof_grid(proof: CurveProof) -> Grid:
     return grid
 
 
-def proofs_grid(case: Case, proofs: Sequence[CurveProof]) -> Grid:
-    """How many Λ(p) are proven of each curve, the bounds on λ, and what becomes of paths and moments."""
+def proofs_grid(case: Case, proofs: Sequence[SetProof]) -> Grid:
+    """How many Λ(p) are proven of each parameter set, the bounds on λ, and what becomes of paths and moments."""
 
-    def cells(proof: CurveProof) -> Cells:
+    def cells(proof: SetProof) -> Cells:
         count = sum(found is not None and found.is_proven for _, found in proof.moments)
         yield Column("proven"), f"{count} of {len(proof.moments)}"
         path = proof.exponent
@@ -83,7 +85,7 @@ def _fate(p: float, found: Enclosure | None) -> str:
     return FATES[found.sign] if p else "is constant"
 
 
-def _counted(proof: CurveProof) -> str:
+def _counted(proof: SetProof) -> str:
     """ "31 grow, 1 decays"."""
     signs = [found.sign for _, found in proof.moments if found is not None]
     counts = {word: signs.count(sign) for sign, word in FATES.items() if sign}
@@ -91,7 +93,7 @@ def _counted(proof: CurveProof) -> str:
     return ", ".join(told) or "none is known"
 
 
-def bounds_text(found: Enclosure | IndexEnclosure) -> tuple[str, str]:
+def bounds_text(found: Enclosure | StabilityIndexEnclosure) -> tuple[str, str]:
     """Both bounds with two digits of how far they are apart, of a single one five digits, rounded outward."""
     if found.lower == found.upper:
         return f"{found.lower:g}", f"{found.upper:g}"

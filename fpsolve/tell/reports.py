@@ -106,7 +106,7 @@ def page_of(
         blocks,
         title=case.headline,
         state="Complete." if complete else INCOMPLETE,
-        equations=equations_of(next(case.curves(0, 1)).problem.system),
+        equations=equations_of(next(case.sets(0, 1)).problem.system),
         about=[*_pieces(about(case))],
         facts={**facts_of(case, started), **facts},
         file=file,
@@ -157,7 +157,7 @@ def _picture(drawing: Drawing) -> Mapping[str, str]:
 
 def about(case: Case) -> Iterator[Block]:
     """The noises, what the equation leaves out, and the parameters."""
-    problem = next(case.curves(0, 1)).problem
+    problem = next(case.sets(0, 1)).problem
     yield from map(Sentence, noise_sentences(problem))
     if problem.linear.cubic:
         yield Sentence(

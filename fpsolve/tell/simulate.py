@@ -1,4 +1,4 @@
-"""Simulated curves as tables and pictures, beside finite elements."""
+"""Simulated parameter sets as tables and pictures, beside finite elements."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import numpy as np
 
 from fpsolve.case.case import Case
 from fpsolve.drawing import Format, figure_for, label_axes, label_of
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, MOMENT
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, SUMMARY_NUMBERS
 from fpsolve.model.quantity import OF_STOPS
-from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.solve.set_result import SetResult, SimulatedSet
 from fpsolve.tell.blocks import Block, Column, Drawing, Grid, Sentence, filled
-from fpsolve.tell.curves import Cells, grid_of
 from fpsolve.tell.notes import MONTE_CARLO
+from fpsolve.tell.sets import Cells, grid_of
 from fpsolve.tell.text import EACH, PICTURES, fate, sampled, sign_of, units_in_words
 
 SURE = 3
@@ -25,18 +25,18 @@ COMPARED = Column("finite elements", 2), Column("s.e. away", 1)
 """The columns of what finite elements have found."""
 
 
-def simulated_response_figure(case: Case, simulated: SimulatedCurve) -> Drawing:
-    """monte_carlo_response.png and .pdf of a curve, if it has a response."""
-    curve = simulated.curve
-    title, name = f"Simulated stationary response{curve.of}", f"monte_carlo_response{curve.suffix}"
+def simulated_response_figure(case: Case, simulated: SimulatedSet) -> Drawing:
+    """monte_carlo_response.png and .pdf of a parameter set, if it has a response."""
+    parameter_set = simulated.parameter_set
+    title, name = f"Simulated stationary response{parameter_set.of}", f"monte_carlo_response{parameter_set.suffix}"
     return Drawing(title, partial(_draw_response, simulated, case.units.time), name, case.headline)
 
 
-def _draw_response(simulated: SimulatedCurve, time_unit: str, paths: Sequence[Path], heading: str) -> None:
+def _draw_response(simulated: SimulatedSet, time_unit: str, paths: Sequence[Path], heading: str) -> None:
     """The density of (x, ẋ) and of the amplitude."""
     if simulated.response is None:
         return
-    with figure_for(paths, heading, simulated.curve.held(time_unit), Format(width=10.5)) as figure:
+    with figure_for(paths, heading, simulated.parameter_set.fixed(time_unit), Format(width=10.5)) as figure:
         plane, radial = figure.subplots(1, 2)
         of = simulated.response.about
         quantities = of.first, of.second, of.amplitude, of.amplitude_density, of.density
@@ -50,17 +50,17 @@ def _draw_response(simulated: SimulatedCurve, time_unit: str, paths: Sequence[Pa
         figure.axes[-1].set_ylabel(label_of(of_both, 36))  # of the colour bar
 
 
-def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[CurveResult] = ()) -> Iterator[Block]:
-    """The simulated curves, one by one or a row each."""
-    solved = {result.curve.number: result for result in results}
+def show(case: Case, simulated: Sequence[SimulatedSet], results: Sequence[SetResult] = ()) -> Iterator[Block]:
+    """The simulated parameter sets, one by one or a row each."""
+    solved = {result.parameter_set.number: result for result in results}
     is_short, over_p = len(simulated) <= EACH, case.figure.x == "p"
     if not (is_short and over_p):
         yield exponent_grid(case, simulated, solved)
         if not is_short:
             yield Sentence(f"{len(simulated)} parameter sets; all numbers are in {MONTE_CARLO}, a file for each set")
     for each in simulated if is_short else ():
-        result = solved.get(each.curve.number)
-        yield Sentence("", case.heading(each.curve) if over_p else each.curve.label)
+        result = solved.get(each.parameter_set.number)
+        yield Sentence("", case.heading(each.parameter_set) if over_p else each.parameter_set.label)
         found = each.result
         if result is None:
             value, error = found.lyapunov_exponent, found.lyapunov_exponent_error
@@ -70,11 +70,11 @@ def show(case: Case, simulated: Sequence[SimulatedCurve], results: Sequence[Curv
             yield moment_grid(case, each, result)
         yield number_grid(case, each, result)
         yield Sentence(f"{found.paths} paths over a time of {found.time:.4g} in steps of {found.step:.4g}")
-        if each.response and each.curve.number <= PICTURES:
+        if each.response and each.parameter_set.number <= PICTURES:
             yield simulated_response_figure(case, each)
 
 
-def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+def moment_grid(case: Case, simulated: SimulatedSet, result: SetResult | None) -> Grid:
     """p, Λ(p) and its standard error; where it is known the value by finite elements, and how far away it is."""
     is_direct = any(each.estimator == "direct" for each in simulated.result.estimates)
     effective = "effective windows" if is_direct else "effective paths"  # a path has many windows
@@ -88,9 +88,9 @@ def moment_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
     return filled("", columns, rows, units_in_words(case.units.time, [MOMENT]))
 
 
-def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | None) -> Grid:
+def number_grid(case: Case, simulated: SimulatedSet, result: SetResult | None) -> Grid:
     """λ, Λ″(0) and the means of a response with their standard errors, beside the finite elements."""
-    known, estimates = {**INDICES, **OF_STOPS}, dict(result.estimates if result else {})
+    known, estimates = {**SUMMARY_NUMBERS, **OF_STOPS}, dict(result.estimates if result else {})
     numbers = [(known[name], each, estimates.get(name)) for name, each in simulated.estimates.items()]
     if response := simulated.response:
         means = result.response.means if result and result.response else {}
@@ -101,11 +101,11 @@ def number_grid(case: Case, simulated: SimulatedCurve, result: CurveResult | Non
     return filled("", columns, rows, units)
 
 
-def exponent_grid(case: Case, simulated: Sequence[SimulatedCurve], solved: Mapping[int, CurveResult]) -> Grid:
-    """λ of each curve by both methods."""
+def exponent_grid(case: Case, simulated: Sequence[SimulatedSet], solved: Mapping[int, SetResult]) -> Grid:
+    """λ of each parameter set by both methods."""
 
-    def cells(each: SimulatedCurve) -> Cells:
-        result, found = solved.get(each.curve.number), each.result
+    def cells(each: SimulatedSet) -> Cells:
+        result, found = solved.get(each.parameter_set.number), each.result
         known = result.lyapunov_exponent.value if result and result.lyapunov_exponent else None
         return zip(columns, _cells(found.lyapunov_exponent, found.lyapunov_exponent_error, known), strict=True)
 

@@ -8,74 +8,74 @@ from pathlib import Path
 
 from fpsolve.case.case import Case
 from fpsolve.results.table import Table
-from fpsolve.solve.curve import CurveResult, SimulatedCurve
+from fpsolve.solve.set_result import SetResult, SimulatedSet
 from fpsolve.solve.sets import everything
-from fpsolve.tell import curves
+from fpsolve.tell import sets
 from fpsolve.tell.blocks import Block, Drawing, Sentence
 from fpsolve.tell.figures import main_figure, rate_figure
-from fpsolve.tell.numbers import excursions, indices, meaning, moment_grid, response, verdicts
+from fpsolve.tell.numbers import excursions, meaning, moment_grid, response, summary_numbers, verdicts
 from fpsolve.tell.pictures import FIGURES
 from fpsolve.tell.text import EACH, PICTURES, ROWS_OVER_P, duration, plural
 
 
 def show(
     case: Case,
-    results: Sequence[CurveResult],
+    results: Sequence[SetResult],
     folder: Path,
-    simulated: Sequence[SimulatedCurve] = (),
+    simulated: Sequence[SimulatedSet] = (),
     table: Table | None = None,
     *,
     is_whole: bool = True,
 ) -> Iterator[Block]:
-    """The verdict, the solved curves in one table, and a few one by one, beside those that are simulated.
+    """The verdict, the solved parameter sets in one table, and a few one by one, beside those that are simulated.
 
     Args:
-        table: the numbers of all curves, if these are known already.
-        is_whole: whether also a few of several curves are told of one by one, and Λ(p) at each of many p.
+        table: the numbers of all parameter sets, if these are known already.
+        is_whole: whether also a few of several parameter sets are told of one by one, and Λ(p) at each of many p.
     """
     table = Table(case, results) if table is None else table
     yield from verdicts(case, results, table)
     yield main_figure(case, results, simulated, table)
     yield rate_figure(case, results)
-    samples = {each.curve.number: each for each in simulated}
+    samples = {each.parameter_set.number: each for each in simulated}
     if len(results) > 1 or case.figure.x != "p":
-        yield from curves.show(case, results, table)
+        yield from sets.show(case, results, table)
     is_each = len(results) == 1 or (is_whole and len(results) <= EACH)
     for place, result in enumerate(results if len(results) <= EACH else results[:PICTURES]):
-        if not result.curve.is_possible:
+        if not result.parameter_set.is_possible:
             continue
-        parts = indices(case, result), excursions(case, result), response(case, result), meaning(result)
+        parts = summary_numbers(case, result), excursions(case, result), response(case, result), meaning(result)
         told = [*chain(*parts)] if is_each else []
         if is_each and _has_grid(case, result, is_whole=is_whole):
             told.append(moment_grid(case, result))
         if told:
-            yield from (Sentence("", result.curve.label), *told)
+            yield from (Sentence("", result.parameter_set.label), *told)
         if place < PICTURES:
-            yield from figures_of(case, result, folder, samples.get(result.curve.number))
+            yield from figures_of(case, result, folder, samples.get(result.parameter_set.number))
 
 
-def _has_grid(case: Case, result: CurveResult, *, is_whole: bool) -> bool:
-    """Whether Λ(p) has a table: over p, of few p or where all is told; Λ(2) alone stands beside indices already."""
-    p, has_indices = result.moments.p, any(result.estimates.values())
-    is_more = (p != 2).any() if has_indices else p.size > 0
+def _has_grid(case: Case, result: SetResult, *, is_whole: bool) -> bool:
+    """Whether Λ(p) has a table: over p, of few p or where all is told; Λ(2) alone stands beside λ already."""
+    p, has_summary_numbers = result.moments.p, any(result.estimates.values())
+    is_more = (p != 2).any() if has_summary_numbers else p.size > 0
     return bool(case.figure.x == "p" and (is_whole or p.size <= ROWS_OVER_P) and is_more)
 
 
-def figures_of(case: Case, result: CurveResult, folder: Path, simulated: SimulatedCurve | None) -> Iterator[Drawing]:
-    """The figures of a curve, beside its simulation."""
+def figures_of(case: Case, result: SetResult, folder: Path, simulated: SimulatedSet | None) -> Iterator[Drawing]:
+    """The figures of a parameter set, beside its simulation."""
     return chain.from_iterable(draw(case, result, folder, simulated) for draw in FIGURES.values())
 
 
 def write_figures(
-    case: Case, results: Sequence[CurveResult], simulated: Sequence[SimulatedCurve], folder: Path, table: Table
+    case: Case, results: Sequence[SetResult], simulated: Sequence[SimulatedSet], folder: Path, table: Table
 ) -> None:
-    """Write all figures that have files: those of all curves together, and those of each."""
+    """Write all figures that have files: those of all parameter sets together, and those of each."""
     main_figure(case, results, simulated, table).write(folder)
     rate_figure(case, results).write(folder)
-    samples = {each.curve.number: each for each in simulated}
+    samples = {each.parameter_set.number: each for each in simulated}
     of_each = FIGURES.keys() & everything(case, 2)
     for result in results if of_each else results[:1]:
-        for figure in figures_of(case, result, folder, samples.get(result.curve.number)):
+        for figure in figures_of(case, result, folder, samples.get(result.parameter_set.number)):
             figure.write(folder)
 
 
@@ -91,5 +91,5 @@ def done_of(case: Case, done: int, failed: int = 0, fault: str = "not converged"
 
 
 def known_of(case: Case, known: int) -> str:
-    """How many of its curves an earlier run had done, if any."""
+    """How many of its parameter sets an earlier run had done, if any."""
     return f"{known} of {case.planned} known from an earlier run" if known else ""

@@ -1,8 +1,8 @@
-"""Numbers, units, counts and times as text, and how much is shown of one, of several and of many curves.
+"""Numbers, units, counts and times as text, and how much is shown of one, of several and of many parameter sets.
 
-Several curves have a row each in one table, up to `ROWS`; of more the extreme ones and some that failed have one. Up
-to `EACH` curves are also described one by one, on a terminal where that is asked for: a table, sentences, and of the
-first `PICTURES` pictures. Where the figure is over a parameter, curves have a row each from the first one on.
+Several sets have a row each in one table, up to `ROWS`; of more the extreme ones and some that failed have one. Up
+to `EACH` sets are also described one by one, on a terminal where that is asked for: a table, sentences, and of the
+first `PICTURES` pictures. Where the figure is over a parameter, parameter sets have a row each from the first one on.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from fpsolve.exponent.error import Estimate, digits
 from fpsolve.tell.blocks import Column
 
 EACH = 10
-"""Curves that are described one by one."""
+"""Parameter sets that are described one by one."""
 PICTURES = 3
-"""Curves that have pictures of their own in a report."""
+"""Parameter sets that have pictures of their own in a report."""
 ROWS = 50
-"""Curves, or values that are expected, that have a row each."""
+"""Parameter sets, or values that are expected, that have a row each."""
 EXTREMES = 2
-"""Quantities whose extreme curves have a row."""
+"""Quantities whose extreme parameter sets have a row."""
 FAILURES = 20
-"""Failed curves among many that have a row."""
+"""Failed parameter sets among many that have a row."""
 MOMENTS = 3
 """The p whose Λ has a column beside that of other quantities."""
 ROWS_OVER_P = 12
-"""Λ(p) of a single curve that a terminal shows unasked."""
+"""Λ(p) of a single parameter set that a terminal shows unasked."""
 PROOFS = 4
 """Proven moments of which each is told."""
 NAMED = 3
-"""Curves that are named of those that share a note."""
+"""Parameter sets that are named of those that share a note."""
 NOTES = 20
 """Notes of each severity."""
 DIGITS = 7
-"""Digits of a number in a sentence, or in a table of many curves."""
+"""Digits of a number in a sentence, or in a table of many parameter sets."""
 NUMBER_COLUMNS = (
     Column("quantity", is_text=True), Column("symbol"), Column("value"), Column("± error"), Column("unit", 2)
 )  # fmt: skip

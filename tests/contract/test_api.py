@@ -20,7 +20,7 @@ from fpsolve.measured import read_spectrum
 from fpsolve.model import ModalSystem
 from fpsolve.solve import compare, simulation_of
 from tests.contract.test_cases import CASES
-from tests.kit import ALL, case_in, case_text, run, simulate_curves, solve_case, solve_sets
+from tests.kit import ALL, case_in, case_text, run, simulate_sets, solve_case, solve_sets
 
 SECTIONS = """[moments]
 p = [1.0]
@@ -67,19 +67,20 @@ def test_examples_of_all_names_at_the_top_run(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_results_of_a_case_travel_to_other_processes(tmp_path):
-    """Solved curves with their eigenpairs, comparisons, and simulated curves, whose task is small."""
+    """Solved parameter sets with their eigenpairs, comparisons, and simulated parameter sets, whose task is small."""
     case = case_in(tmp_path, case_text(SECTIONS, noise={"D0": 0.1}, epsilon=0.5, c1=0.8, c2=0.5), [ALL])
-    [solved], [simulated] = solve_sets(case), simulate_curves(case)
+    [solved], [simulated] = solve_sets(case), simulate_sets(case)
     [comparison] = compare(case, [solved.result])
     whole, sample, other = copied((solved, simulated, comparison))
     np.testing.assert_array_equal(whole.result.moments.value, solved.result.moments.value)
-    assert (whole.result.estimates, whole.result.curve) == (solved.result.estimates, solved.result.curve)
+    assert whole.result.estimates == solved.result.estimates
+    assert whole.result.parameter_set == solved.result.parameter_set
     assert compare(case, [whole.result]) == [comparison] == [other]
     drawn, first = (each.pictures["eigenfunctions"] for each in (whole, solved))
     np.testing.assert_array_equal(drawn.pairs[0].left, first.pairs[0].left)
     assert (sample.result, sample.estimates) == (simulated.result, simulated.estimates)
     np.testing.assert_array_equal(sample.response.density, simulated.response.density)
-    task = simulation_of, next(case.curves()), tuple(case.simulated.tolist()), case.monte_carlo
+    task = simulation_of, next(case.sets()), tuple(case.simulated.tolist()), case.monte_carlo
     assert len(pickle.dumps(task)) < 4000
     function, *arguments = copied(task)
     assert function(*arguments)[0] == simulated.result

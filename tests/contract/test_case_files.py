@@ -33,11 +33,12 @@ EXCEL = '\ufeffnoise.D0,"noise.treatment",oscillator.c1\r\n\r\n0.1,exact,-0\r\n 
 
 
 def varied(folder, text, *overrides):
-    """What varies in the curves of a case."""
+    """What varies in the parameter sets of a case."""
     case = case_in(folder, f"{SMALL}[vary]\n{text}\n", overrides)
-    found = [tuple(curve.varied.values()) for curve in case.curves()]
-    assert (case.planned, [curve.number for curve in case.curves()]) == (len(found), list(range(1, len(found) + 1)))
-    assert [*case.curves(1)] == [*case.curves()][1:]
+    found = [tuple(parameter_set.varied.values()) for parameter_set in case.sets()]
+    assert [each.number for each in case.sets()] == [*range(1, case.planned + 1)]
+    assert case.planned == len(found)
+    assert [*case.sets(1)] == [*case.sets()][1:]
     assert repr(found) == repr([tuple(each or 0.0 for each in row) for row in found])  # no -0.0
     return found
 
@@ -78,7 +79,7 @@ def varied(folder, text, *overrides):
         ('file = "other.csv"', ["vary={}"], [()]),
     ],
 )
-def test_curves_of_lists_ranges_and_files_of_sets(tmp_path, text, overrides, sets):
+def test_sets_of_lists_ranges_and_files_of_sets(tmp_path, text, overrides, sets):
     (tmp_path / "sets.csv").write_text(SETS)
     (tmp_path / "excel.csv").write_bytes(EXCEL.encode())
     assert varied(tmp_path, text, *overrides) == sets
@@ -128,7 +129,7 @@ def test_a_hundred_thousand_values_are_read_within_seconds_and_one_more_is_refus
     ],
 )
 def test_override_of_a_parameter(tmp_path, override, key, value):
-    assert next(case_in(tmp_path, SMALL, [override]).curves()).parameters[key] == value
+    assert next(case_in(tmp_path, SMALL, [override]).sets()).parameters[key] == value
 
 
 def test_later_overrides_win_and_tables_replace_tables(tmp_path):
@@ -154,31 +155,31 @@ def test_a_case_is_read_with_line_ends_of_windows_and_by_a_link(tmp_path):
     assert load_case(tmp_path / "link.toml").title == "small"
 
 
-def test_labels_and_heading_of_curves(tmp_path):
+def test_labels_and_heading_of_sets(tmp_path):
     text = '[vary]\nnoise.treatment = ["ou-reduction", "exact"]\noscillator.omega = [3, 0.0001]\n'
     case = case_in(tmp_path, SMALL + text)
-    *_, last = case.curves()
+    *_, last = case.sets()
     assert (last.suffix, last.label) == ("-4", "noise.treatment = exact, oscillator.omega = 0.0001")
     assert case.heading(last) == "small: noise.treatment = exact, oscillator.omega = 0.0001"
     assert case.about("oscillator.omega").title == r"natural frequency $\omega$ (rad/time)"
-    [alone] = case_in(tmp_path, SMALL).curves()
+    [alone] = case_in(tmp_path, SMALL).sets()
     assert (alone.suffix, alone.label) == ("", "")
 
 
 def test_reduced_and_exact_noise_have_one_perturbation_theory(tmp_path):
     case = case_in(tmp_path, SMALL + 'vary.noise.treatment = ["ou-reduction", "exact"]')
-    reduced, exact = case.curves()
+    reduced, exact = case.sets()
     assert reduced.noise == ReducedNoise(D0=1.0, tau0=1.0, r0=0.9)
     assert exact.noise == reduced.noise.at({"treatment": "exact"}) == NonGaussianNoise(D0=1.0, tau0=1.0, r0=0.9)
     assert len({second_order(each.problem).moment_exponent(2.0) for each in (reduced, exact)}) == 1
 
 
-def test_an_expectation_selects_curves_by_their_values(tmp_path):
+def test_an_expectation_selects_sets_by_their_values(tmp_path):
     text = 'vary = { "noise.treatment" = ["ou-reduction", "exact"], "noise.D0" = [1, 2] }\n[[expect]]\n'
     text += 'quantity = "variance_rate"\nvalue = 1\natol = 9\nsource = "none"\n'
     text += 'where = { noise.treatment = "exact", noise.D0 = 2 }\n'
     case = case_in(tmp_path, SMALL + text)
-    assert [case.expect[0].selects(curve.varied) for curve in case.curves()] == [False, False, False, True]
+    assert [case.expect[0].selects(each.varied) for each in case.sets()] == [False, False, False, True]
 
 
 def test_a_mesh_is_made_from_numbers_or_read_beside_the_case(tmp_path):
@@ -222,7 +223,7 @@ def test_quantities_that_a_case_asks_for(tmp_path, text, overrides, asked):
         ("", ['vary."oscillator.c3"=[0.0, 0.2]'], (True, False)),
     ],
 )
-def test_response_is_computed_unasked_of_up_to_ten_nonlinear_curves(tmp_path, text, overrides, found):
+def test_response_is_computed_unasked_of_up_to_ten_nonlinear_sets(tmp_path, text, overrides, found):
     case = case_in(tmp_path, SMALL + text, overrides)
     assert ("response" in case.asked, case.leaves_out_response) == found
 
@@ -300,19 +301,19 @@ def test_names_of_parameters_and_noises_of_equations(tmp_path):
         (['noise.axial={ kind = "sine-wiener", amplitude = 0.5, sigma = 1.0 }'], False),
     ],
 )
-def test_digest_of_a_curve_follows_from_its_problem_alone(tmp_path, overrides, same):
-    known, found = (next(case_in(tmp_path, OWN, each).curves()).digest for each in ([], overrides))
+def test_digest_of_a_set_follows_from_its_problem_alone(tmp_path, overrides, same):
+    known, found = (next(case_in(tmp_path, OWN, each).sets()).digest for each in ([], overrides))
     assert (known == found) is same
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_shipped_case_is_read_and_its_curves_differ(path):
+def test_shipped_case_is_read_and_its_sets_differ(path):
     case = load_case(path)
-    curves = list(case.curves())
+    parameter_sets = [*case.sets()]
     assert (case.name, case.path) == (path.stem, path)
-    assert all(tuple(curve.varied) == case.vary.keys for curve in curves)
-    assert len({curve.digest for curve in curves}) == case.planned == len(curves)
-    assert all(curve.parameters == curve.problem.values for curve in curves)
+    assert all(tuple(each.varied) == case.vary.keys for each in parameter_sets)
+    assert len({each.digest for each in parameter_sets}) == case.planned == len(parameter_sets)
+    assert all(each.parameters == each.problem.values for each in parameter_sets)
 
 
 MODES = """

@@ -31,14 +31,14 @@ FEWER = {"delayed_mathieu": 5e-11, "rattling": 3 * 7e-5}
 
 @cache
 def solved(name, *overrides):
-    """A case and its curves, with what it compares and draws alone."""
+    """A case and its parameter sets, with what it compares and draws alone."""
     wanted = ["output.eigenfunctions=[]", "output.sensitivities=false", *overrides]
     case = load_case(CASES / f"{name}.toml", wanted)
     return case, solve_case(case)
 
 
-def curves(name):
-    """p, Λ(p) of shape (curves, p) and the curves, in the order of the varied values, which increase."""
+def solved_sets(name):
+    """p, Λ(p) of shape (sets, p) and the parameter sets, in the order of the varied values, which increase."""
     case, results = solved(name, *["mesh={}"] * (name in LONG))
     [values] = case.vary.columns.values()
     assert list(values) == sorted(values)
@@ -74,7 +74,7 @@ def test_case_of_a_system_meets_its_expectations_within_the_stated_error(path):
     assert [each for each in comparisons if not each.met] == []
     assert not checked.failures
     for each in comparisons:
-        [result] = [result for result in results if result.curve.varied == each.varied]
+        [result] = [result for result in results if result.parameter_set.varied == each.varied]
         if each.expectation.of_response:
             continue  # from paths, whose standard error is in its tolerance
         if each.expectation.p is None:
@@ -119,8 +119,8 @@ VARIED = dict(zip(FIGURES, ("D0", "D0", "r0", "tau0", "D0 omega", "omega", "rest
 def test_curves_of_a_figure_have_the_parameters_of_its_caption(name):
     case = load_case(CASES / f"{name}.toml")
     assert {key.partition(".")[2] for key in case.vary.keys} == set(VARIED[name].split())
-    for curve in case.curves():
-        stated = {key.partition(".")[2]: value for key, value in curve.parameters.items()}
+    for parameter_set in case.sets():
+        stated = {key.partition(".")[2]: value for key, value in parameter_set.parameters.items()}
         assert stated | CAPTIONS[name] == stated
 
 
@@ -129,9 +129,9 @@ def test_expected_values_of_weak_noise_are_those_of_the_paper(name):
     """Eqs. (37)-(39) where the source says so; the others lie within O(ε⁴) of them."""
     case = load_case(CASES / f"{name}.toml")
     for each in (each for each in case.expect if not each.of_response):
-        [curve] = [curve for curve in case.curves() if each.selects(curve.varied)]
+        [parameter_set] = [parameter_set for parameter_set in case.sets() if each.selects(parameter_set.varied)]
         theory = getattr(perturbation, "moment_exponent" if each.quantity == "moment" else each.quantity)
-        value = theory(curve.problem.system, curve.noise, *([] if each.p is None else [each.p]))
+        value = theory(parameter_set.problem.system, parameter_set.noise, *([] if each.p is None else [each.p]))
         is_theory = "second order" in each.source
         if case.system.epsilon <= 0.1:
             assert each.value == pytest.approx(value, rel=1e-9 if is_theory else 1.5e-3)
@@ -141,7 +141,7 @@ def test_expected_values_of_weak_noise_are_those_of_the_paper(name):
 
 def test_fig1_differs_little_from_perturbation_theory():
     """«the differences between analytical and numerical results are very small»"""
-    p, values, results = curves("fig1")
+    p, values, results = solved_sets("fig1")
     np.testing.assert_allclose(p, np.arange(-2, 6.01, 0.25), atol=1e-14)
     theory = np.array([result.moments.perturbation for result in results])
     assert 1e-5 < np.max(np.abs(values - theory)) < 2e-3 * np.max(np.abs(theory))
@@ -166,7 +166,7 @@ TRENDS = {
 @pytest.mark.parametrize("name", sampled(*TRENDS, keep=4))
 def test_stability_goes_with_a_parameter_as_the_paper_says(name):
     """«δp > 0 indicates that the system is pth moment-stable as 0 < p < δp»"""
-    p, values, results = curves(name)
+    p, values, results = solved_sets(name)
     indices = [result.stability_index.value for result in results]
     exponents = [result.lyapunov_exponent.value for result in results]
     for sign, numbers in zip(TRENDS[name], (indices, exponents, values[:, p > 0]), strict=True):
@@ -185,15 +185,15 @@ def test_fig2b_departure_from_gaussian_noise_matters_little_near_1():
     """«the effect of departure coefficient r0 on the stochastic stability is very small as r0 → 1»"""
     case = load_case(CASES / "fig2b.toml")
     near, nearer, gaussian = (
-        moment_lyapunov(case.curve({"noise.r0": r0}).problem, 2.0).value[0] for r0 in (0.98, 0.99, 1.0)
+        moment_lyapunov(case.parameter_set({"noise.r0": r0}).problem, 2.0).value[0] for r0 in (0.98, 0.99, 1.0)
     )
     assert abs(nearer - gaussian) < min(0.02 * abs(gaussian), 0.55 * abs(near - gaussian))
 
 
 def test_fig2c_short_correlation_times_nearly_coincide():
     """«for the case τ0 = 0.0001, 0.001 and 0.01, the … Λ(p) are almost identical»"""
-    _, values, results = curves("fig2c")
-    times = [result.curve.varied["noise.tau0"] for result in results]
+    _, values, results = solved_sets("fig2c")
+    times = [result.parameter_set.varied["noise.tau0"] for result in results]
     assert times[:3] == [1e-4, 1e-3, 1e-2] != times
     height = np.ptp(values)
     assert np.max(np.ptp(values[:3], axis=0)) < 0.01 * height
@@ -206,7 +206,9 @@ def test_fig3_frequency_lowers_and_noise_raises_the_largest_exponent():
     case, results = solved("fig3")
     assert (case.figure.x, case.figure.y) == ("oscillator.omega", "lyapunov_exponent")
     keys = "oscillator.omega", "noise.D0"
-    found = {tuple(result.curve.varied[key] for key in keys): result.lyapunov_exponent.value for result in results}
+    found = {
+        tuple(result.parameter_set.varied[key] for key in keys): result.lyapunov_exponent.value for result in results
+    }
     omegas, intensities = map(case.vary.values, keys)
     values = np.array([[found[omega, intensity] for intensity in intensities] for omega in omegas])
     spread = np.ptp(values, axis=1)
@@ -228,4 +230,4 @@ def test_almost_sure_stability_ends_where_the_paper_says(name, key):
         "fig6": -strength / 4 + 2 * oscillator.omega * (1 - oscillator.restitution) / math.pi,
     }[name]
     for shift, sign in ((-0.01, -1), (0.01, 1)):
-        assert sign * ExponentSolver(case.curve({key: end + shift}).problem).lyapunov_exponent().value > 0
+        assert sign * ExponentSolver(case.parameter_set({key: end + shift}).problem).lyapunov_exponent().value > 0

@@ -41,7 +41,7 @@ TEXTS = {
     "title.toml": TEXT.replace("A test", "Another\\n test"),
     "a\x1b[31mb.toml": TEXT,
 }
-"""The files of each folder in which a command is typed; all their curves are solved at once."""
+"""The files of each folder in which a command is typed; all their parameter sets are solved at once."""
 UNITS = "Units: omega in rad/time … c1 in 1/time … D0 in 1/time … tau0 in time"
 QUANTITIES = "moment, lyapunov_exponent, stability_index … impact_rate … eigenfunctions"
 JOBS = "must be a whole number from 1 to 1000"
@@ -323,9 +323,7 @@ def test_a_sigterm_ends_a_run_that_keeps_what_it_has(tmp_path, before):
             process.kill()
     assert process.returncode == 143
     assert re.search(
-        r"^interrupted after [1-9]\d* of 5000 parameter sets; what was done is kept in results/case; run it again",
-        err,
-        re.M,
+        r"^interrupted after [1-9]\d* of 5000 parameter sets; what was done is kept in results/case; run", err, re.M
     )
     assert "Traceback" not in err
     assert files(tmp_path / "results/case") >= TABLES - {"summary.json"}  # which many sets have not

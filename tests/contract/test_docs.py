@@ -104,7 +104,7 @@ def test_format_command_and_picture_of_the_pages_are_of_a_case(tmp_path, capsys)
     case = fpsolve.load_case(CASES / "minimal.toml")
     results = solve_case(case)
     typed(ROOT / "docs/extending.md")[0]["write_lines"](case, results, tmp_path / "lines.txt")
-    assert "curve 1, lyapunov_exponent = " in (tmp_path / "lines.txt").read_text(encoding="utf-8")
+    assert "parameter set 1, lyapunov_exponent = " in (tmp_path / "lines.txt").read_text(encoding="utf-8")
     for each in names["law"](case, results[0], tmp_path, None):
         each.write(tmp_path)
     assert (tmp_path / "law.png").exists()

@@ -14,7 +14,7 @@ import xarray
 
 import fpsolve
 from fpsolve import NotConverged, load_case, open_results
-from fpsolve.exponent import INDICES
+from fpsolve.exponent import SUMMARY_NUMBERS
 from tests.conftest import sampled
 from tests.kit import DRAWN, HOPELESS, LEAN, TABLES, TEXT, case_in, files, put, read_csv, read_json, run
 
@@ -24,7 +24,7 @@ WHOLE = DRAWN.replace("figure = true", "figure = false")
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The results and the folder of two curves with all that is one number, run once."""
+    """The results and the folder of two parameter sets with all that is one number, run once."""
     case = case_in(tmp_path_factory.mktemp("whole"), WHOLE)
     results = fpsolve.run(case, case.path.parent)
     return SimpleNamespace(results=results, folder=case.path.parent / "test", case=case)
@@ -34,7 +34,7 @@ def test_numbers_of_all_files_are_those_of_python(whole):
     folder, results = whole.folder, whole.results
     summary, moments, rows = (
         read(folder / name)
-        for read, name in ((read_json, "summary.json"), (read_csv, "moments.csv"), (read_csv, "curves.csv"))
+        for read, name in ((read_json, "summary.json"), (read_csv, "moments.csv"), (read_csv, "sets.csv"))
     )
     names = {"p": "p", "moment": "value", "moment_error": "error_estimate", "moment_derivative": "derivative"}
     names |= {
@@ -45,43 +45,45 @@ def test_numbers_of_all_files_are_those_of_python(whole):
     with xarray.open_dataset(folder / "results.nc") as found:
         found = found.load()
     apart = open_results(folder)
-    for k, (result, curve, row) in enumerate(zip(results, summary["curves"], rows, strict=True)):
-        here = found.sel(dict(result.curve.varied))
+    for k, (result, parameter_set, row) in enumerate(zip(results, summary["sets"], rows, strict=True)):
+        here = found.sel(dict(result.parameter_set.varied))
         for name, attribute in names.items():
             values = getattr(result.moments, attribute)
             assert values.size == 3
-            np.testing.assert_array_equal([each[name] for each in curve["moments"]], values)
+            np.testing.assert_array_equal([each[name] for each in parameter_set["moments"]], values)
             np.testing.assert_array_equal([float(each[name]) for each in moments[3 * k : 3 * k + 3]], values)
             np.testing.assert_array_equal(here[name], values)
             np.testing.assert_array_equal(apart[name][3 * k : 3 * k + 3], values)
         for name, estimate in result.estimates.items():
             for end, value in {"": estimate.value, "_error": estimate.error_estimate}.items():
-                assert value == curve[name + end] == float(row[name + end]) == float(here[name + end])
+                assert value == parameter_set[name + end] == float(row[name + end]) == float(here[name + end])
             assert (
-                curve[f"{name}_perturbation"]
+                parameter_set[f"{name}_perturbation"]
                 == float(here[f"{name}_perturbation"])
-                == INDICES[name].theory(result.curve.problem)
+                == SUMMARY_NUMBERS[name].theory(result.parameter_set.problem)
             )
-        assert curve["critical_restitution"] == pytest.approx(curve["critical_restitution_perturbation"], rel=5e-3)
+        assert parameter_set["critical_restitution"] == pytest.approx(
+            parameter_set["critical_restitution_perturbation"], rel=5e-3
+        )
         D0 = (0.1, 1.0)[k]
         assert (
             D0
-            == curve["varied"]["noise.D0"]
-            == curve["parameters"]["noise.D0"]
+            == parameter_set["varied"]["noise.D0"]
+            == parameter_set["parameters"]["noise.D0"]
             == float(row["noise.D0"])
             == float(here["noise.D0"])
         )
-        assert curve["parameters"] == dict(result.curve.parameters)
-        assert (curve["status"], row["status"], int(here.status)) == ("converged", "converged", 0)
-        assert curve["seconds"] == float(row["seconds"]) == float(here.seconds) > 0
-        assert curve["discretisation"] == result.discretisation
-        assert curve["warnings"] == []
+        assert parameter_set["parameters"] == dict(result.parameter_set.parameters)
+        assert (parameter_set["status"], row["status"], int(here.status)) == ("converged", "converged", 0)
+        assert parameter_set["seconds"] == float(row["seconds"]) == float(here.seconds) > 0
+        assert parameter_set["discretisation"] == result.discretisation
+        assert parameter_set["warnings"] == []
         [file] = (folder / ("eigenfunctions-2" if k else "eigenfunctions")).glob("*.vtu")
         facts = pyvista.read(file).field_data
-        assert (facts["Lambda"][0], facts["noise.D0"][0], facts["curve"][0]) == (result.moment(2.0).value, D0, k + 1)
-    known = summary["curves"][1]["moments"][0]
+        assert (facts["Lambda"][0], facts["noise.D0"][0], facts["set"][0]) == (result.moment(2.0).value, D0, k + 1)
+    known = summary["sets"][1]["moments"][0]
     assert known["moment_perturbation"] == pytest.approx(0.014149421727, rel=1e-10)
-    assert summary["curves"][1]["lyapunov_exponent"] != summary["curves"][0]["lyapunov_exponent"]
+    assert summary["sets"][1]["lyapunov_exponent"] != summary["sets"][0]["lyapunov_exponent"]
 
 
 def test_summary_and_results_say_what_they_are_of(whole):
@@ -96,7 +98,7 @@ def test_summary_and_results_say_what_they_are_of(whole):
         "wall_seconds",
         "overrides",
         "case_text",
-        "curves",
+        "sets",
     ]
     assert [summary[name] for name in state] == ["test", "A test", fpsolve.__version__, {"time": "time"}, True, 2, 2]
     assert summary["case_text"] == case.text == WHOLE
@@ -115,7 +117,7 @@ def test_summary_and_results_say_what_they_are_of(whole):
         assert found.status.attrs["flag_values"].tolist() == [0, 1, 2, 3, 4, 5]
     drawn = {
         "density.vtu",
-        "curves.pvd",
+        "sets.pvd",
         *(f"eigenfunctions{k}" + end for k in ("", "-2") for end in (".pvd", "/p+2.0.vtu")),
     }
     assert {name for name in files(whole.folder) if not name.startswith("records/")} == TABLES | drawn
@@ -123,12 +125,12 @@ def test_summary_and_results_say_what_they_are_of(whole):
 
 def without_times(folder):
     """All numbers of the tables, without what tells one run from another of the same case."""
-    summary, rows = read_json(folder / "summary.json"), read_csv(folder / "curves.csv")
-    for each in (*summary["curves"], *rows):
+    summary, rows = read_json(folder / "summary.json"), read_csv(folder / "sets.csv")
+    for each in (*summary["sets"], *rows):
         assert each.pop("seconds", None)
     data = xarray.load_dataset(folder / "results.nc").drop_vars("seconds")
     return (
-        summary["curves"],
+        summary["sets"],
         rows,
         read_csv(folder / "moments.csv"),
         data.to_dict(encoding=False)["data_vars"].keys(),
@@ -170,10 +172,10 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_to_the_same_numbers(wh
     told = interrupt(whole.case, tmp_path, 1)
     assert told == f"interrupted after 1 of 2 parameter sets; what was done is kept in {folder}; run it again to go on"
     summary = read_json(folder / "summary.json")
-    assert (summary["complete"], summary["planned"], summary["done"], len(summary["curves"])) == (False, 2, 1, 1)
+    assert (summary["complete"], summary["planned"], summary["done"], len(summary["sets"])) == (False, 2, 1, 1)
     assert TABLES | mine | {"eigenfunctions.pvd"} <= files(folder)
     assert not earlier & files(folder)
-    assert round(fpsolve.run(whole.case, tmp_path)[0].seconds, 6) == summary["curves"][0]["seconds"]
+    assert round(fpsolve.run(whole.case, tmp_path)[0].seconds, 6) == summary["sets"][0]["seconds"]
     assert without_times(folder) == without_times(whole.folder)
     assert {each for each in files(folder) - files(whole.folder) if not each.startswith("records/")} == mine
     for name in files(folder):
@@ -187,13 +189,13 @@ def test_an_interrupted_run_keeps_what_it_has_and_goes_on_to_the_same_numbers(wh
 
 
 @pytest.mark.parametrize("at", sampled(2, 1, 3))
-def test_an_interrupted_curve_keeps_its_moments_and_goes_on(tmp_path, at):
+def test_an_interrupted_set_keeps_its_moments_and_goes_on(tmp_path, at):
     sets = ["vary={}", NUMBERS, "moments.p=[-1.0, 0.5, 1.0, 2.0]"]
     case = case_in(tmp_path, TEXT, sets)
     assert interrupt(case, tmp_path, at).startswith("interrupted after 0 of 1 parameter set; what was done is kept in")
     summary, rows = read_json(tmp_path / "test/summary.json"), read_csv(tmp_path / "test/moments.csv")
-    assert (summary["complete"], summary["done"], summary["curves"][0]["status"]) == (False, 0, "partly")
-    assert "not everything is solved yet; run the same command again to go on" in summary["curves"][0]["warnings"]
+    assert (summary["complete"], summary["done"], summary["sets"][0]["status"]) == (False, 0, "partly")
+    assert "not everything is solved yet; run the same command again to go on" in summary["sets"][0]["warnings"]
     assert 0 < len(rows) < 4
     [result], [whole] = fpsolve.run(case, tmp_path), fpsolve.run(case, tmp_path / "whole")
     assert result.status is whole.status
@@ -256,10 +258,10 @@ def kept(tmp_path_factory):
 def test_a_second_run_solves_what_has_changed_alone(kept, tmp_path, sets, known):
     """What is known has the numbers, and the seconds, of the first run."""
     shutil.copytree(kept, tmp_path, dirs_exist_ok=True)
-    before = {row["noise.D0"]: row for row in read_csv(tmp_path / "results/case/curves.csv")}
+    before = {row["noise.D0"]: row for row in read_csv(tmp_path / "results/case/sets.csv")}
     options = [each if each.startswith("--") else f"--set={each}" for each in sets]
     done = run(tmp_path, "run", "case.toml", "--quiet", "--jobs", "1", "--set", NUMBERS, *options)
-    count = len(rows := read_csv(tmp_path / "results/case/curves.csv"))
+    count = len(rows := read_csv(tmp_path / "results/case/sets.csv"))
     end = f"; {known} of {count} known from an earlier run" * bool(known)
     assert re.search(rf"written: results/case \({count} parameter sets, [^;]*{end}\)$", done.out.strip()), done
     same = [row["seconds"] == before[row["noise.D0"]]["seconds"] for row in rows if row["noise.D0"] in before]
@@ -328,7 +330,7 @@ def test_pictures_of_an_earlier_run_go(whole, tmp_path):
     assert names == {"eigenfunctions.pvd", "eigenfunctions/p-1.0.vtu", "density.vtu"}
 
 
-def test_of_many_curves_an_eigenfunction_of_the_first_is_drawn_unasked(tmp_path):
+def test_of_many_sets_an_eigenfunction_of_the_first_is_drawn_unasked(tmp_path):
     text = TEXT.replace("eigenfunctions = [2.0]", "")
     fpsolve.run(
         case_in(tmp_path, text, ["vary.noise.D0={start=0.1, stop=1.0, num=11}", "moments.p=[-1.0, 1.5]"]), tmp_path
@@ -340,7 +342,7 @@ def test_of_many_curves_an_eigenfunction_of_the_first_is_drawn_unasked(tmp_path)
 
 
 def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
-    """The strong-noise curve fails at p = 2 and −1; the weak one and p = 0 are kept."""
+    """The strong-noise parameter set fails at p = 2 and −1; the weak one and p = 0 are kept."""
     text = TEXT.replace('"noise.D0" = [0.1, 1.0]', '"oscillator.epsilon" = [0.01, 1.5]').replace("[2.0]\n", "[]\n")
     with pytest.raises(NotConverged, match="use more cells") as caught:
         fpsolve.run(case_in(tmp_path, text, [HOPELESS]), tmp_path)
@@ -350,7 +352,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
         [-1.0, 2.0],
     ]
     folder = tmp_path / "test"
-    first, second = read_json(folder / "summary.json")["curves"]
+    first, second = read_json(folder / "summary.json")["sets"]
     assert [[row["p"] for row in each["moments"]] for each in (first, second)] == [[2.0, 0.0, -1.0], [0.0]]
     assert (second["status"], second["lyapunov_exponent"], second["p_failed"]) == ("partly", None, 2)
     assert any("[mesh]" in each for each in second["warnings"])
@@ -372,7 +374,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "noise.D0=0.1",
                 "output={quantities=['stability_index', 'lyapunov_exponent']}",
             ],
-            "no index",
+            "no summary number",
             "fpsolve found no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]",
             "stability_index",
         ),
@@ -421,14 +423,14 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
 )
 def test_a_number_that_is_not_there_is_null_with_a_status_and_a_warning(tmp_path, sets, status, warning, missing):
     done = run(tmp_path, "run", "case.toml", "--set", "vary={}", *(f"--set={each}" for each in sets), case=TEXT)
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    assert (done.code, curve["status"]) == (0 if status == "no index" else 3, status)
-    assert ("none found" in done.out) == (status == "no index")
-    assert sum(text.startswith(warning) for text in curve["warnings"]) == 1
-    [row] = read_csv(tmp_path / "results/case/curves.csv")
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    assert (done.code, parameter_set["status"]) == (0 if status == "no summary number" else 3, status)
+    assert ("none found" in done.out) == (status == "no summary number")
+    assert sum(text.startswith(warning) for text in parameter_set["warnings"]) == 1
+    [row] = read_csv(tmp_path / "results/case/sets.csv")
     assert row["status"] == status
     if missing:
-        assert curve[missing] is None
+        assert parameter_set[missing] is None
         assert row[missing] == ""
     else:
         assert not list(tmp_path.rglob("*.vtu"))
@@ -448,9 +450,9 @@ def test_what_is_not_asked_for_is_in_no_file(tmp_path):
         assert found["oscillator.omega"].values.tolist() == [1.0, 2.0, 2.0]
         assert json.loads(found.attrs["overrides"]) == sets
         np.testing.assert_array_equal(found.lyapunov_exponent, [each.lyapunov_exponent.value for each in results])
-    [curve, *_] = read_json(tmp_path / "test/summary.json")["curves"]
-    assert not {"moments", "variance_rate", "sensitivities"} & set(curve)
-    header = list(read_csv(tmp_path / "test/curves.csv")[0])
+    [parameter_set, *_] = read_json(tmp_path / "test/summary.json")["sets"]
+    assert not {"moments", "variance_rate", "sensitivities"} & set(parameter_set)
+    header = list(read_csv(tmp_path / "test/sets.csv")[0])
     assert header[2:5] == ["lyapunov_exponent", "lyapunov_exponent_error", "lyapunov_exponent_perturbation"]
 
 
@@ -467,9 +469,9 @@ def test_zero_has_no_sign_in_any_file(tmp_path):
         0,
         3,
     )
-    for name in ("summary.json", "moments.csv", "curves.csv", "monte_carlo.json", "eigenfunctions.pvd"):
+    for name in ("summary.json", "moments.csv", "sets.csv", "monte_carlo.json", "eigenfunctions.pvd"):
         text = (tmp_path / "results/case" / name).read_text(encoding="utf-8")
-        text = json.dumps(json.loads(text)["curves"]) if name == "summary.json" else text  # what was typed is kept
+        text = json.dumps(json.loads(text)["sets"]) if name == "summary.json" else text  # what was typed is kept
         assert "-0.0" not in re.findall(r"-?[\d.e+-]+", text), name
 
 

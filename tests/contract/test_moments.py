@@ -23,7 +23,7 @@ from fpsolve import (
     moment_lyapunov,
     open_results,
 )
-from fpsolve.exponent import INDICES, QUANTITIES, Budget, solve_moments
+from fpsolve.exponent import QUANTITIES, SUMMARY_NUMBERS, Budget, solve_moments
 from fpsolve.model import Telegraph, White
 from tests.kit import read_csv, read_json, run
 from tests.numbers.rows.heavy_tails import tailed
@@ -111,7 +111,7 @@ def test_progress_of_moments_is_reported_once_for_each(count):
 
 def test_root_is_known_where_many_moments_are_interpolated():
     many = solve_moments(SOLVER, np.linspace(-2, 6, 33))
-    assert many.root == pytest.approx(INDICES["stability_index"].solve(SOLVER).value, rel=1e-3)
+    assert many.root == pytest.approx(SUMMARY_NUMBERS["stability_index"].solve(SOLVER).value, rel=1e-3)
     for pair, value in zip(many.pairs[::8], many.value[::8], strict=True):
         assert pair.value == pytest.approx(value, rel=1e-8)
     for p in (np.linspace(1, 6, 33), [-1.0, 1.0]):
@@ -170,10 +170,10 @@ def test_quantity_has_a_record_and_is_near_its_approximation(name):
     quantity = QUANTITIES[name]
     assert quantity.name == name
     assert all((quantity.symbol, quantity.title, quantity.equation, quantity.closed_form, quantity.error_source))
-    if name in INDICES:
-        theory = INDICES[name].theory(FIG1)
+    if name in SUMMARY_NUMBERS:
+        theory = SUMMARY_NUMBERS[name].theory(FIG1)
         assert theory == pytest.approx(getattr(perturbation, name)(FIG1.system, NOISE), rel=1e-12)
-        assert INDICES[name].solve(SOLVER).value == pytest.approx(theory, rel=5e-3)
+        assert SUMMARY_NUMBERS[name].solve(SOLVER).value == pytest.approx(theory, rel=5e-3)
 
 
 CASE = """
@@ -243,7 +243,7 @@ def test_case_with_a_rate_function_writes_it_to_all_tables(tmp_path):
     folder, done = tmp_path / "rates", result.moments
     np.testing.assert_allclose(done.rate_function, done.p * done.derivative - done.value, atol=1e-12)
     assert (done.rate_function > 0).tolist() == (done.p != 0).tolist()
-    rows = read_json(folder / "summary.json")["curves"][0]["moments"], read_csv(folder / "moments.csv")
+    rows = read_json(folder / "summary.json")["sets"][0]["moments"], read_csv(folder / "moments.csv")
     for each in rows:
         assert [float(row["rate_function"]) for row in each] == done.rate_function.tolist()
     assert open_results(folder).rate_function.sel(p=2.0).item() == done.rate_function[0]

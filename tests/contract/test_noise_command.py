@@ -172,7 +172,7 @@ def test_two_noises_in_the_place_of_that_of_a_case_act_by_the_density_of_their_s
     case = load_case(tmp_path / "results/m.csv/noise.toml")
     assert case.system.noise_sections == ("noise.first", "noise.second")
     assert case.vary.keys == (("system.c1",) if name == "delta" else ())
-    assert moment_lyapunov(case.curve(next(iter(case.vary.sets))).problem, 2.0).value[0] == pytest.approx(
+    assert moment_lyapunov(case.parameter_set(next(iter(case.vary.sets))).problem, 2.0).value[0] == pytest.approx(
         moment, rel=0.02
     )
 

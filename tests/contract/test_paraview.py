@@ -244,21 +244,21 @@ DRAWN = "output={ quantities=['moment', 'eigenfunctions'], eigenfunctions=[1.5],
         ),
     ),
 )
-def test_series_over_the_curves_has_files_with_their_parameters(tmp_path, vary, times, names):
-    """The time is the one number that is varied, or else the number of the curve."""
+def test_series_over_the_sets_has_files_with_their_parameters(tmp_path, vary, times, names):
+    """The time is the one number that is varied, or else the number of the parameter set."""
     sets = [vary, DRAWN, "moments.p=[1.5]", "oscillator.omega=1.25"]
     assert run(tmp_path, "run", "case.toml", "--jobs", "1", *(f"--set={each}" for each in sets), case=TEXT).code == 0
-    series = tmp_path / "results/case/curves.pvd"
+    series = tmp_path / "results/case/sets.pvd"
     listed = ElementTree.parse(series).findall("Collection/DataSet")
     assert [float(each.get("timestep")) for each in listed] == times == list(pyvista.PVDReader(series).time_values)
     assert [each.get("name") for each in listed] == names
     for time, each in zip(times, listed, strict=True):
         data = pyvista.read(series.parent / each.get("file")).field_data
-        assert time in (data["noise.D0"][0], data["curve"][0])
+        assert time in (data["noise.D0"][0], data["set"][0])
         assert (data["oscillator.omega"][0], data["p"][0]) == (1.25, 1.5)
         if "noise.D0" in vary:
             assert bytes(data["varied"]).decode() == f"noise.D0 = {time:g} (1/time)"
-            assert bytes(data["held"]).decode().splitlines() == [
+            assert bytes(data["fixed"]).decode().splitlines() == [
                 "oscillator: omega = 1.25 (rad/time), restitution = 0.8, c1 = 0.1 (1/time), epsilon = 0.1, "
                 "c2 = 0 (1/(time length^2)), c3 = 0 (time/length^2), impact = delta",
                 "noise: tau0 = 0.5 (time), r0 = 0.95, treatment = ou-reduction",
@@ -368,7 +368,7 @@ def test_meshio_reads_the_numbers_that_vtk_reads(tmp_path, request):
         for name in own.point_data:
             np.testing.assert_array_equal(found.point_data[name], own.point_data[name])
         assert found.field_data.keys() == set(own.field_data.keys())
-        assert bytes(found.field_data["held"]).decode().startswith(("oscillator: ", "system: "))
+        assert bytes(found.field_data["fixed"]).decode().startswith(("oscillator: ", "system: "))
     grid = pyvista.read(tmp_path / "results/response/monte_carlo_response.vti")
     simulated = read_json(tmp_path / "results/response/monte_carlo.json")
     assert grid.cell_data["density"] @ grid.compute_cell_sizes()["Area"] == pytest.approx(1, abs=0.01)

@@ -72,19 +72,19 @@ def test_bounds_and_verdicts_of_a_case_are_told_written_and_accepted(proven, dat
     assert re.search(r"│ +Λ\(0\) │ +0 │ +0 │ +0 │ +is constant │", proven.out)
     assert "Proven: almost every path decays; the moment of order 2 decays." in proven.out
     assert re.search(r"written: results/case \(1 parameter set, [\d.]+ s\)", proven.out)
-    assert set(data) == {"fpsolve", "case", "complete", "curves"}
+    assert set(data) == {"fpsolve", "case", "complete", "sets"}
     assert data["complete"] is True
-    (curve,) = data["curves"]
-    assert set(curve) == {"parameters", "moments", "lyapunov_exponent", "stability_index", "verdicts"}
-    assert curve["parameters"]["system.zeta"] == 0.05
-    assert curve["stability_index"] is None
-    assert curve["verdicts"] == ["almost every path decays", "the moment of order 2 decays"]
-    zero, second = curve["moments"]
+    (parameter_set,) = data["sets"]
+    assert set(parameter_set) == {"parameters", "moments", "lyapunov_exponent", "stability_index", "verdicts"}
+    assert parameter_set["parameters"]["system.zeta"] == 0.05
+    assert parameter_set["stability_index"] is None
+    assert parameter_set["verdicts"] == ["almost every path decays", "the moment of order 2 decays"]
+    zero, second = parameter_set["moments"]
     assert [zero[key] for key in ("p", "lower", "upper")] == [0.0, 0.0, 0.0]
     assert second["upper"] - second["lower"] <= 1e-3
-    (solved,) = moment_lyapunov(next(load_case(proven.folder / "case.toml").curves()).problem, [2.0]).value
+    (solved,) = moment_lyapunov(next(load_case(proven.folder / "case.toml").sets()).problem, [2.0]).value
     assert second["lower"] < solved < second["upper"]
-    entries = [zero, second, {**curve["lyapunov_exponent"], "p": None}]
+    entries = [zero, second, {**parameter_set["lyapunov_exponent"], "p": None}]
     assert [certificate_checker.check(each) for each in entries] == 3 * [""]
     accepted, note = check(tmp_path, data).out.splitlines()
     assert accepted == "accepted: a.json (bounds on 3 numbers follow from their certificates)"
@@ -94,8 +94,8 @@ def test_bounds_and_verdicts_of_a_case_are_told_written_and_accepted(proven, dat
 def set_moment(**change):
     """A claim of Λ(2) and its certificate; a number is moved by so many times the distance of the bounds."""
 
-    def changed(curve):
-        moment = curve["moments"][1]
+    def changed(parameter_set):
+        moment = parameter_set["moments"][1]
         size = moment["upper"] - moment["lower"]
         moment.update({key: moment[key] + by * size if isinstance(by, float) else by for key, by in change.items()})
 
@@ -103,35 +103,35 @@ def set_moment(**change):
 
 
 def put(*places):
-    """A change of what stands at a place of a curve."""
+    """A change of what stands at a place of a parameter set."""
     *above, last, value = places
 
-    def changed(curve):
+    def changed(parameter_set):
         for place in above:
-            curve = curve[place]
-        curve[last] = value
+            parameter_set = parameter_set[place]
+        parameter_set[last] = value
 
     return changed
 
 
-def of_other_p(curve):
-    zero, second = curve["moments"]
-    exponent = curve["lyapunov_exponent"]
-    curve.update(verdicts=[], moments=[zero | {"p": 2.0}, exponent | {"p": 2.0}])
-    curve["lyapunov_exponent"] = {name: value for name, value in second.items() if name != "p"}
+def of_other_p(parameter_set):
+    zero, second = parameter_set["moments"]
+    exponent = parameter_set["lyapunov_exponent"]
+    parameter_set.update(verdicts=[], moments=[zero | {"p": 2.0}, exponent | {"p": 2.0}])
+    parameter_set["lyapunov_exponent"] = {name: value for name, value in second.items() if name != "p"}
 
 
-def of_other_system(curve):
-    curve["moments"][0] = json.loads(json.dumps(curve["moments"][0]).replace("-0.1]", "-0.2]"))
+def of_other_system(parameter_set):
+    parameter_set["moments"][0] = json.loads(json.dumps(parameter_set["moments"][0]).replace("-0.1]", "-0.2]"))
 
 
-def one_sided(curve):
-    curve["moments"][1]["certificate"]["upper"] = None
+def one_sided(parameter_set):
+    parameter_set["moments"][1]["certificate"]["upper"] = None
 
 
-def open_above(curve):
-    one_sided(curve)
-    curve["moments"][1]["upper"] = None
+def open_above(parameter_set):
+    one_sided(parameter_set)
+    parameter_set["moments"][1]["upper"] = None
 
 
 BOUNDS = "moments.0", "moments.1", "lyapunov_exponent"
@@ -169,9 +169,9 @@ CLOSER = ["moments.1: the bounds are closer than those of the certificate"]
 )
 def test_claims_of_a_file_are_accepted_only_where_they_follow(data, tmp_path, change, words):
     """None is any objection."""
-    change(data["curves"][0])
+    change(data["sets"][0])
     found = objections(tmp_path, data)
-    assert found if words is None else found == [f"curves.0.{each}" for each in words]
+    assert found if words is None else found == [f"sets.0.{each}" for each in words]
 
 
 LOW, HIGH = ({"p": p, "lower": v, "upper": v + 0.1, "certificate": None} for p, v in ((-1.2, 0.1), (-1.0, -0.2)))
@@ -196,8 +196,8 @@ LOW, HIGH = ({"p": p, "lower": v, "upper": v + 0.1, "certificate": None} for p, 
 def test_a_stability_index_needs_a_change_of_sign_between_two_p_of_one_sign(data, tmp_path, change, words):
     """Each Λ is without a certificate here, of which the objections tell, too."""
     index = {"lower": -1.2, "upper": -1.0, "moments": [LOW, HIGH]} | change
-    data["curves"] = [{**data["curves"][0], "moments": [], "lyapunov_exponent": None, "verdicts": []}]
-    data["curves"][0]["stability_index"] = index
+    data["sets"] = [{**data["sets"][0], "moments": [], "lyapunov_exponent": None, "verdicts": []}]
+    data["sets"][0]["stability_index"] = index
     found = [text for text in objections(tmp_path, data) if "there is no certificate" not in text]
     assert words in found[0] if words else not found
 
@@ -231,8 +231,8 @@ def by_hand(change):
         for part in (certificate["upper"], certificate["lower"]) if key in certificate["upper"] else (certificate,):
             part[key] = value
     moment = {"p": 1.5, "lower": -1e-9, "upper": 1e-9, "certificate": certificate}
-    curve = {"parameters": {}, "moments": [moment], "lyapunov_exponent": None, "stability_index": None}
-    return {"fpsolve": "0", "case": "a", "complete": True, "curves": [{**curve, "verdicts": []}]}
+    parameter_set = {"parameters": {}, "moments": [moment], "lyapunov_exponent": None, "stability_index": None}
+    return {"fpsolve": "0", "case": "a", "complete": True, "sets": [{**parameter_set, "verdicts": []}]}
 
 
 POSITIVE = "u > 0 is not certain"
@@ -292,7 +292,7 @@ def test_certificates_whose_parts_do_not_fit_together_are_malformed(tmp_path, ch
 
 
 def test_keys_that_are_missing_or_too_many_make_a_proof_malformed(data, tmp_path):
-    for path in ((), ("curves", 0), ("curves", 0, "moments", 1), ("curves", 0, "moments", 1, "certificate")):
+    for path in ((), ("sets", 0), ("sets", 0, "moments", 1), ("sets", 0, "moments", 1, "certificate")):
         table = data
         for part in path:
             table = table[part]
@@ -319,8 +319,8 @@ def test_keys_that_are_missing_or_too_many_make_a_proof_malformed(data, tmp_path
         *((text, "should be a valid dictionary") for text in (b"[]", b"1", b"null", b"true", b'"a"')),
         *((text, "is no JSON") for text in (b"{", b"title = 1")),
         (b"{}", "Field required"),
-        (b'{"fpsolve": "0", "case": "a", "complete": true, "curves": []}', "at least 1 item"),
-        (b'{"fpsolve": "0", "case": 1e999999999, "complete": true, "curves": []}', "case: "),
+        (b'{"fpsolve": "0", "case": "a", "complete": true, "sets": []}', "at least 1 item"),
+        (b'{"fpsolve": "0", "case": 1e999999999, "complete": true, "sets": []}', "case: "),
     ],
 )
 def test_files_that_are_no_proof_are_refused_in_one_line(tmp_path, content, words):
@@ -338,10 +338,10 @@ def test_the_check_tells_how_many_bounds_follow_and_what_does_not(tmp_path):
     )
     told = check(tmp_path, proof | {"complete": False})
     assert "certificates; the run that proved them was interrupted)\n" in told.out
-    proof["curves"][0]["moments"][0]["upper"] = 0.0
+    proof["sets"][0]["moments"][0]["upper"] = 0.0
     told = check(tmp_path, proof)
     assert (told.code, told.out) == (REJECTED, "rejected: a.json (1 objection, bounds on 1 number)\n")
-    assert told.err == "a.json: curves.0.moments.0: the bounds are closer than those of the certificate\n"
+    assert told.err == "a.json: sets.0.moments.0: the bounds are closer than those of the certificate\n"
 
 
 TAILS = "--set", "noise.treatment=exact", "--set", "moments.p=[-0.5]"
@@ -409,7 +409,7 @@ def test_a_width_that_is_not_met_is_told_and_the_bounds_are_kept(tmp_path):
     done = run(tmp_path, "prove", "case.toml", "--width", "1e-30", *weak, "--quiet", case=GAUSSIAN)
     assert done.code == NOT_CONVERGED
     assert "(1 parameter set, 1 not as close as wanted, " in done.out
-    (moment,) = read_json(proof_in(tmp_path))["curves"][0]["moments"]
+    (moment,) = read_json(proof_in(tmp_path))["sets"][0]["moments"]
     assert moment["upper"] - moment["lower"] > 1e-30
 
 
@@ -419,17 +419,17 @@ def test_several_processes_write_the_same_proof(tmp_path):
     for jobs, out in (("1", "results"), ("2", "others")):
         assert run(tmp_path, "prove", "case.toml", *varied, "--jobs", jobs, "--out", out, case=SYSTEM).code == 0
     assert proof_in(tmp_path).read_bytes() == (tmp_path / "others/case/proof.json").read_bytes()
-    curves = read_json(proof_in(tmp_path))["curves"]
-    assert [curve["parameters"]["noise.axial.a"] for curve in curves] == [0.4, 0.5]
+    sets = read_json(proof_in(tmp_path))["sets"]
+    assert [parameter_set["parameters"]["noise.axial.a"] for parameter_set in sets] == [0.4, 0.5]
 
 
 @pytest.mark.slow
-def test_many_moments_are_counted_and_many_curves_have_a_row_each(tmp_path):
+def test_many_moments_are_counted_and_many_sets_have_a_row_each(tmp_path):
     """And p of a range is the float as it stands."""
     many = "--set", "moments.p={start=-0.1, stop=0.5, num=7}"
     done = run(tmp_path, "prove", "case.toml", *LOOSE, *many, "--set", "output.quantities=['moment']", case=SYSTEM)
     assert re.search(r"Proven: of 7 moments 1 grows, 5 decay\.\n", done.out)
-    found = read_json(proof_in(tmp_path))["curves"][0]["moments"]
+    found = read_json(proof_in(tmp_path))["sets"][0]["moments"]
     assert [each["p"] for each in found] == load_case(tmp_path / "case.toml", [many[1]]).p.tolist()
     varied = f'vary."noise.axial.a"={[0.05 * k for k in range(4, 15)]}'
     done = run(tmp_path, "prove", "case.toml", *LOOSE, "--set", varied, "--set", "moments.p=[0.0]")
@@ -449,7 +449,7 @@ def test_a_folder_holds_proofs_of_its_parameters_only(tmp_path):
     assert not proof.exists()
     assert run(tmp_path, "prove", "case.toml", *LOOSE, "--quiet").code == 0
     assert not (proof.parent / "summary.json").exists()
-    assert read_json(proof)["curves"][0]["parameters"]["noise.D0"] == 0.5
+    assert read_json(proof)["sets"][0]["parameters"]["noise.D0"] == 0.5
 
 
 def forged(line):
@@ -495,7 +495,7 @@ def test_an_interrupted_run_keeps_what_it_has_proven(tmp_path, kind, code):
     assert "interrupted after 1 of 2 bounds; what was done is kept in results/case" in said
     proof = read_json(proof_in(tmp_path))
     assert proof["complete"] is False
-    zero, second = proof["curves"][0]["moments"]
+    zero, second = proof["sets"][0]["moments"]
     assert zero["certificate"] is not None
     assert second == {"p": 2.0, "lower": None, "upper": None, "certificate": None}
     assert check(tmp_path, proof).code == 0

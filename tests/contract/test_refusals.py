@@ -146,8 +146,8 @@ def test_any_parameters_in_their_ranges_give_a_case_or_a_refusal(tmp_path, numbe
         text, count = re.subn(rf"^{key} = .*", f"{key} = {stated}", text, flags=re.MULTILINE)
         assert count == 1
     try:
-        [curve] = case_in(tmp_path, text).curves()
-        found = {"moments"} if curve.problem else set()
+        [parameter_set] = case_in(tmp_path, text).sets()
+        found = {"moments"} if parameter_set.problem else set()
     except CaseError as error:
         found = {fault.key for fault in error.faults}
     assert set() < found <= {"oscillator", "moments"}

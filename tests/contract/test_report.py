@@ -102,12 +102,12 @@ def test_a_narrow_terminal_cuts_no_word_and_no_number(tmp_path, monkeypatch, com
 
 
 @pytest.mark.slow
-def test_of_many_curves_the_extreme_and_the_first_failed_ones_have_a_row(tmp_path):
+def test_of_many_sets_the_extreme_and_the_first_failed_ones_have_a_row(tmp_path):
     sets = ["vary={ oscillator.epsilon={start=0.01, stop=1.5, num=60} }", LEAN, HOPELESS]
     done = run(tmp_path, "run", "case.toml", "--jobs", "1", *(f"--set={each}" for each in sets), case=TEXT)
-    curves = read_json(tmp_path / "results/case/summary.json")["curves"]
+    parameter_sets = read_json(tmp_path / "results/case/summary.json")["sets"]
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in done.out.splitlines() if line.startswith("│")]
-    found = {f"{each['varied']['oscillator.epsilon']:g}": each for each in curves}
+    found = {f"{each['varied']['oscillator.epsilon']:g}": each for each in parameter_sets}
     failed = [name for name, each in found.items() if each["status"] == "failed"]
     assert [row[0] for row in rows if row[3] == "failed"] == failed[:20]
     assert {row[1] for row in rows if row[3] == "failed"} == {""}  # not "none", which nobody knows
@@ -121,14 +121,14 @@ def test_of_many_curves_the_extreme_and_the_first_failed_ones_have_a_row(tmp_pat
     assert f"Almost every path decays in 0 parameter sets, grows in {len(known)}." in done.out
     end = f"60 parameter sets: {len(known)} with warnings, {len(failed)} not converged; "
     end += "the table has the first 20 that are not converged"
-    assert f"{end}; all numbers are in curves.csv and results.nc" in done.out
+    assert f"{end}; all numbers are in sets.csv and results.nc" in done.out
     failures, warnings = notes(done.err).splitlines()
     assert re.fullmatch(
         r"not converged: case: 38 of 60 parameter sets: fpsolve found no λ: .*phi_cells.*; worst for osc.* = 1.5 .*",
         failures.replace("(", "", 1),
     )
     assert re.fullmatch(
-        r"warning: case: 22 of 60 parameter sets: rtol = 1e-08 is not met by λ: .*; worst for .* \(all in curves.csv\)",
+        r"warning: case: 22 of 60 parameter sets: rtol = 1e-08 is not met by λ: .*; worst for .* \(all in sets.csv\)",
         warnings,
     )
 
@@ -144,7 +144,7 @@ def test_of_many_expected_values_those_that_differ_are_shown(tmp_path):
 
 
 def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
-    """And name the curves where they are few; of weak noise is spoken where its equation is shown."""
+    """And name the parameter sets where they are few; of weak noise is spoken where its equation is shown."""
     sets = [
         "oscillator.epsilon=1.0",
         "moments.rtol=1e-4",
@@ -157,9 +157,9 @@ def test_notes_that_differ_in_numbers_are_one_with_the_worst(tmp_path):
     few = notes(run(tmp_path, *asked, case=TEXT).err)
     assert few.count("note: ") == 1
     assert few.startswith(f"note: case, noise.D0 = 0.5 and noise.D0 = 1: {weak}. Do not rely on it from |p| = 2 on")
-    assert few.endswith("; worst for noise.D0 = 1 (all in curves.csv)\n")
+    assert few.endswith("; worst for noise.D0 = 1 (all in sets.csv)\n")
     many = run(tmp_path, *asked, "--set", "vary.noise.D0={start=0.3, stop=1.0, num=12}").err
-    assert weak not in many  # a table of many curves has no column of it
+    assert weak not in many  # a table of many parameter sets has no column of it
     assert "perturbation theory, Eq. (37)" not in run(tmp_path, "check", *asked[1:]).err
 
 
@@ -204,8 +204,8 @@ def test_excursions_are_in_the_summary(tmp_path):
         "noise.a = 0.7: fpsolve found no P(sup ‖x‖ ≥ A): got xi = 0.8; must be one of the states, -0.7, 0.7" in done.err
     )
     assert run(tmp_path, "run", "case.toml", "--out", "all", case=BURSTS).code == 0
-    [curve] = read_json(tmp_path / "all/case/summary.json")["curves"]
-    found = curve["excursions"]
+    [parameter_set] = read_json(tmp_path / "all/case/summary.json")["sets"]
+    found = parameter_set["excursions"]
     assert found["start"] == {"phi": 0.0, "xi": "stationary"}
     assert (found["stability_index"], found["lower"], found["upcrossings"]) == pytest.approx(
         (1.302367339, 0.712, 4.10), rel=2e-3
@@ -265,7 +265,7 @@ def test_the_report_is_one_safe_file_with_equation_numbers_meanings_pictures_and
         "amplitude",
         "The moment Lyapunov exponent, Λ(p), over p",
         "Eigenfunction T(φ, ξ) of p = 2",
-        "All numbers are in summary.json, curves.csv, moments.csv, results.nc",
+        "All numbers are in summary.json, sets.csv, moments.csv, results.nc",
         "numpy",
         f"With --set figure.title='{NASTY}'",
         'kind = "telegraph"',
@@ -343,9 +343,7 @@ def spring(force="", noise=None, rate="v"):
 )
 def test_equations_have_the_numbers_and_variables_of_the_case(request, system, equations):
     cases = request.config.rootpath / "cases"
-    assert (
-        equations_of(system(lambda name: next(load_case(cases / f"{name}.toml").curves()).problem.system)) == equations
-    )
+    assert equations_of(system(lambda name: next(load_case(cases / f"{name}.toml").sets()).problem.system)) == equations
 
 
 OWN = (

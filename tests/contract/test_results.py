@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 import fpsolve
 from fpsolve import NonGaussianNoise, OrnsteinUhlenbeck, Problem, VibroImpactOscillator
 from fpsolve.analysis import Axis, design, excursion, uncertainty
-from fpsolve.exponent import INDICES, Estimate, Failure
+from fpsolve.exponent import SUMMARY_NUMBERS, Estimate, Failure
 from fpsolve.model import Telegraph, White
 from fpsolve.simulation import MomentEstimate, MonteCarlo, Response
 from tests.contract.test_cases import CASES
@@ -57,7 +57,7 @@ MAIN = {
     "no estimate": ("moment", 1),
     "response": ("density", 30),
     "settled": ("density", None),
-    "curve": ("moment", None),
+    "set": ("moment", None),
     "directions": ("density", None),
     "design": ("oscillator.c1", None),
     "uncertain": ("moment", None),
@@ -77,7 +77,7 @@ def results(tmp_path_factory):
         ESTIMATES, 0.001, 0.0001, 0.005, 0.0002, paths=4096, time=400.0, step=0.02, seed=1, impacts=12345,
         warnings=("one", "another"), parameters=HIT.values,
     )  # fmt: skip
-    case = case_in(tmp_path_factory.mktemp("curve"), TEXT, ["output={ quantities=['moment', 'lyapunov_exponent'] }"])
+    case = case_in(tmp_path_factory.mktemp("case"), TEXT, ["output={ quantities=['moment', 'lyapunov_exponent'] }"])
     found = {
         "moments": moments,
         "no moment": replace(moments, failures=(Failure(9.0, "it is too large"),), **empty),
@@ -95,7 +95,7 @@ def results(tmp_path_factory):
         "no estimate": replace(simulated, estimates=()),
         "response": RESPONSE,
         "settled": fpsolve.stationary_response(Problem(SETTLING, OrnsteinUhlenbeck(alpha=2.0, sigma=0.9)), rtol=0.1),
-        "curve": fpsolve.run(case, case.path.parent)[0],
+        "set": fpsolve.run(case, case.path.parent)[0],
         "directions": fpsolve.tilted_density(fpsolve.ExponentSolver(TURNING, rtol=1e-3).pair(1.0)),
         "design": design(HIT, "moment(2) = 0.02", Axis("oscillator.c1", -2.0, 2.0)),
         "uncertain": uncertainty(HIT, {"noise.D0": 0.05}, [1.0, 2.0]),
@@ -161,7 +161,7 @@ def test_a_missing_number_says_why():
 
 
 def test_nobody_writes_into_the_arrays_of_results(results):
-    found = [each for result in (*results.values(), results["curve"].moments) for each in vars(result).values()]
+    found = [each for result in (*results.values(), results["set"].moments) for each in vars(result).values()]
     assert {each.flags.writeable for each in found if isinstance(each, np.ndarray)} == {False}
 
 
@@ -233,11 +233,11 @@ def test_data_hold_the_numbers_of_python(results):
     assert found.mean_energy.attrs["units"] == "length²/time²"
 
 
-@pytest.mark.parametrize("name", INDICES)
-def test_an_index_knows_what_it_is(name):
-    estimate = INDICES[name].solve(fpsolve.ExponentSolver(HIT))
+@pytest.mark.parametrize("name", SUMMARY_NUMBERS)
+def test_a_summary_number_knows_what_it_is(name):
+    estimate = SUMMARY_NUMBERS[name].solve(fpsolve.ExponentSolver(HIT))
     found = estimate.to_xarray()
-    assert found[name].attrs == INDICES[name].attributes
+    assert found[name].attrs == SUMMARY_NUMBERS[name].attributes
     same(found, name, estimate.value, estimate.error_estimate)
 
 
@@ -251,10 +251,10 @@ def test_sensitivities_are_by_parameter_with_units_of_a_ratio(results):
                 slopes.theta[key],
                 estimate.value,
             )
-    for name, row in slopes.indices.items():
+    for name, row in slopes.summary_numbers.items():
         for key, estimate in row.items():
             same(found.sel(parameter=key), f"{name}_by_theta", estimate.value, estimate.error_estimate)
-    units = {key: each.quantity.unit for key, each in slopes.indices["lyapunov_exponent"].items()}
+    units = {key: each.quantity.unit for key, each in slopes.summary_numbers["lyapunov_exponent"].items()}
     assert [units[f"oscillator.{name}"] for name in ("omega", "c1", "epsilon")] == ["1/time/(rad/time)", "1", "1/time"]
     assert found.theta_unit.sel(parameter="oscillator.omega").item() == "rad/time"
     missing = replace(slopes, moments=({}, slopes.moments[1])).to_xarray()
@@ -344,7 +344,7 @@ def test_pictures_show_the_numbers(results):
     assert band.max() == pytest.approx(1.02)
     slopes = results["sensitivities"]
     bars = slopes.plot().containers
-    for bar, row in zip(bars, (slopes.indices["lyapunov_exponent"], *slopes.moments), strict=True):
+    for bar, row in zip(bars, (slopes.summary_numbers["lyapunov_exponent"], *slopes.moments), strict=True):
         assert [patch.get_width() for patch in bar] == pytest.approx(
             [slopes.theta[key] * row[key].value for key in slopes.theta]
         )

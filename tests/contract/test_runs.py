@@ -68,11 +68,11 @@ s = 0.8
 """
 
 
-def curves(folder, text, *options, code=0):
-    """What summary.json has of each curve."""
+def parameter_sets(folder, text, *options, code=0):
+    """What summary.json has of each parameter set."""
     done = run(folder, "run", "case.toml", "--jobs", "1", *options, case=text)
     assert done.code == code, done.err
-    return read_json(folder / "results/case/summary.json")["curves"]
+    return read_json(folder / "results/case/summary.json")["sets"]
 
 
 def gaussian(*rates):
@@ -133,28 +133,28 @@ def of_clock():
     ],
 )
 def test_second_moment_of_a_case_of_equations_is_within_its_error(tmp_path, text, second, most):
-    [curve] = curves(tmp_path, text)
-    [found] = curve["moments"]
+    [parameter_set] = parameter_sets(tmp_path, text)
+    [found] = parameter_set["moments"]
     assert abs(found["moment"] - second()) <= found["moment_error"] + 1e-9
     assert found["moment_error"] <= most
 
 
 def test_a_moment_by_closed_equations_is_solved_on_no_elements(tmp_path):
-    [curve] = curves(tmp_path, MODES)
-    assert (curve["discretisation"], curve["moments"][0]["moment_derivative"]) == (None, None)
+    [parameter_set] = parameter_sets(tmp_path, MODES)
+    assert (parameter_set["discretisation"], parameter_set["moments"][0]["moment_derivative"]) == (None, None)
 
 
 def test_exact_noise_is_said_to_be_that_of_the_paper(tmp_path):
     out = run(tmp_path, "run", "case.toml", case=DAMPED + NON_GAUSSIAN).out
     assert out.startswith('T\nnoise.treatment = "exact": the noise is that of Eq. (7).\n')
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    assert curve["parameters"]["noise.treatment"] == "exact"
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    assert parameter_set["parameters"]["noise.treatment"] == "exact"
 
 
 @pytest.mark.slow
 def test_three_variables_are_reported_and_proven_under_white_noise_alone(tmp_path):
-    [curve] = curves(tmp_path, VOLTAGE, "--report")
-    assert curve["discretisation"] is None  # Λ(2) is by closed equations
+    [parameter_set] = parameter_sets(tmp_path, VOLTAGE, "--report")
+    assert parameter_set["discretisation"] is None  # Λ(2) is by closed equations
     folder = tmp_path / "results/case"
     assert "du/dt = −0.5 v − u" in (folder / "report.html").read_text(encoding="utf-8")
     for arguments in (["prove", "case.toml"], ["prove", "--check", str(folder / "proof.json")]):
@@ -179,12 +179,14 @@ VARIED += GAUSSIAN.replace("[noise]", "[noise.axial]")
 
 
 def test_values_in_vary_and_in_set_are_solved_alike(tmp_path):
-    both = curves(tmp_path, VARIED, "--set", "vary.system.zeta=[0.1, 0.2]", "--set", "vary.noise.axial.alpha=[2.0]")
-    assert [curve["moments"][0]["moment"] for curve in both] == pytest.approx(
+    both = parameter_sets(
+        tmp_path, VARIED, "--set", "vary.system.zeta=[0.1, 0.2]", "--set", "vary.noise.axial.alpha=[2.0]"
+    )
+    assert [parameter_set["moments"][0]["moment"] for parameter_set in both] == pytest.approx(
         [gaussian(-1, -0.2), gaussian(-1, -0.4)], abs=1e-8
     )
     for options in ("system.zeta=0.2", "system.parameters.zeta=0.2"):
-        [alone] = curves(tmp_path, VARIED, "--set", options)
+        [alone] = parameter_sets(tmp_path, VARIED, "--set", options)
         assert alone["moments"][0]["moment"] == both[1]["moments"][0]["moment"]
 
 
@@ -204,13 +206,13 @@ standard_deviation = 0.5
 
 def test_growth_on_and_across_a_ray_that_is_never_left_is_told_for_each(tmp_path):
     """S(0) = 2 · 0.25: p(−0.3) + ¼p²·0.16 across the ray x = 0, and −p + ¼p² on it; from records, too."""
-    [curve], again = (curves(tmp_path, TRIANGULAR) for _ in range(2))
-    assert again == [curve]
-    assert [each["name"] for each in curve["classes"]] == [
+    [parameter_set], again = (parameter_sets(tmp_path, TRIANGULAR) for _ in range(2))
+    assert again == [parameter_set]
+    assert [each["name"] for each in parameter_set["classes"]] == [
         f"{how} the ray at phi = 1.5708" for how in ("along", "across")
     ]
-    p, total = (np.array([row[name] for row in curve["moments"]]) for name in ("p", "moment"))
-    for found, growth, strength in zip(curve["classes"], (-1.0, -0.3), (1.0, 0.4), strict=True):
+    p, total = (np.array([row[name] for row in parameter_set["moments"]]) for name in ("p", "moment"))
+    for found, growth, strength in zip(parameter_set["classes"], (-1.0, -0.3), (1.0, 0.4), strict=True):
         assert abs(found["lyapunov_exponent"] - growth) < 1e-9
         expected = p * growth + 0.25 * p**2 * strength**2
         np.testing.assert_allclose([row["moment"] for row in found["moments"]], expected, atol=1e-9)
@@ -236,13 +238,13 @@ def test_blocks_of_variables_are_solved_one_by_one_and_told_by_name(tmp_path):
     assert done.code == 3
     assert said.count("Λ(p) for p < 0 is not computed") == 1
     assert "(y), (x, v) do not all drive each other" in said
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    slow, own = curve["classes"]
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    slow, own = parameter_set["classes"]
     assert [slow["name"], own["name"]] == ["y", "x, v"]
     assert slow["lyapunov_exponent"] == pytest.approx(-0.4, abs=1e-9)
-    assert [row["moment"] for row in curve["moments"]] == [row["moment"] for row in own["moments"]]
+    assert [row["moment"] for row in parameter_set["moments"]] == [row["moment"] for row in own["moments"]]
     second = even(2, spring(1.0, 0.15), (LOAD, White(0.8)))
-    assert curve["moments"][-1]["moment"] == pytest.approx(second, abs=1e-8)
+    assert parameter_set["moments"][-1]["moment"] == pytest.approx(second, abs=1e-8)
 
 
 EXACT = {"tau0": 1.0, "r0": 1.0, "treatment": "exact"}
@@ -257,7 +259,7 @@ def test_of_a_sweep_into_algebraic_tails_only_those_sets_lack_moments(tmp_path):
     said = " ".join(done.err.split())
     for name in ("Λ(-0.4)", "δ_p", "Λ″(0)"):
         assert f"{name} is not computed: for r0 > 1" in said
-    light, heavy = read_json(tmp_path / "results/case/summary.json")["curves"]
+    light, heavy = read_json(tmp_path / "results/case/summary.json")["sets"]
     assert [[row["p"] for row in each["moments"]] for each in (light, heavy)] == [[-0.4, 0.0], [0.0]]
     assert light["stability_index"] is not None
     assert heavy["stability_index"] is None
@@ -290,7 +292,7 @@ def test_a_set_that_cannot_be_solved_fails_alone_and_is_told_once(tmp_path, vary
     done = run(tmp_path, "run", "case.toml", "--jobs", "1", *(f"--set={each}" for each in options), case=text)
     assert done.code == code
     assert " ".join(done.err.split()).count(words) == 1
-    assert [row["status"] for row in read_csv(tmp_path / "results/case/curves.csv")] == status
+    assert [row["status"] for row in read_csv(tmp_path / "results/case/sets.csv")] == status
     for command in ("simulate", "prove") if "restitution" in words else ():
         assert words in run(tmp_path, command, "case.toml").err
 
@@ -303,7 +305,7 @@ def test_a_set_of_a_file_that_overflows_is_told_with_its_line(tmp_path):
     for line, header in ((5, ""), (6, "\n")):
         done = run(tmp_path, "run", "case.toml", "--jobs", "1", **{"case": text, "sets.csv": header + rows})
         assert (done.code, f"sets.csv:{line}: Eqs. (37)-(38) or R^p overflow; " in done.err) == (3, True)
-        status = [row["status"] for row in read_csv(tmp_path / "results/case/curves.csv")]
+        status = [row["status"] for row in read_csv(tmp_path / "results/case/sets.csv")]
         assert status[::2] + status[3:4] == ["converged"] * 3 + ["failed"]
 
 
@@ -321,8 +323,8 @@ NO_INDEX = {"omega": 10.0, "c1": -1.0, "restitution": 0.5}
 
 
 def test_orders_of_moments_may_be_left_out_and_a_run_that_finds_no_number_exits_with_3(tmp_path):
-    [curve] = curves(tmp_path, case_text(NAMED, noise={"D0": 0.1}, **NO_INDEX))
-    assert (curve["lyapunov_exponent"] < 0, "moments" in curve) == (True, False)
+    [parameter_set] = parameter_sets(tmp_path, case_text(NAMED, noise={"D0": 0.1}, **NO_INDEX))
+    assert (parameter_set["lyapunov_exponent"] < 0, "moments" in parameter_set) == (True, False)
     for name, code in (("moment", 2), ("stability_index", 3)):
         assert run(tmp_path, "run", "case.toml", "--set", f"output.quantities=['{name}']").code == code
 
@@ -346,32 +348,34 @@ def response(tmp_path_factory):
     """The folder of a run of a nonlinear oscillator that bounces off a wall."""
     folder = tmp_path_factory.mktemp("response")
     expected = EXPECTED.format("amplitude_squared", 1.54568) + EXPECTED.format("impact_rate", 1.0)
-    curves(folder, case_text(RESPONSE + expected, noise=THIN, **BOUNCING))
+    parameter_sets(folder, case_text(RESPONSE + expected, noise=THIN, **BOUNCING))
     return folder
 
 
 def test_means_of_a_stationary_response_agree_with_each_other_and_with_another_code(response):
     """a² = x² + ẋ²/ω², E = ω²a²/2, and an impact in each half-turn, nearly."""
-    [curve] = read_json(response / "results/case/summary.json")["curves"]
-    found, x, v = curve["response"], curve["response_x_squared"], curve["response_v_squared"]
-    assert curve["response_amplitude_squared"] == pytest.approx(x + v, rel=1e-12)
-    assert curve["response_energy"] == pytest.approx(0.5 * (x + v), rel=1e-12)
-    assert curve["response_impact_rate"] == pytest.approx(1 / math.pi, rel=0.02)
+    [parameter_set] = read_json(response / "results/case/summary.json")["sets"]
+    found, x, v = parameter_set["response"], parameter_set["response_x_squared"], parameter_set["response_v_squared"]
+    assert parameter_set["response_amplitude_squared"] == pytest.approx(x + v, rel=1e-12)
+    assert parameter_set["response_energy"] == pytest.approx(0.5 * (x + v), rel=1e-12)
+    assert parameter_set["response_impact_rate"] == pytest.approx(1 / math.pi, rel=0.02)
     assert abs(found["balance"]) <= found["balance_error"]
     assert (found["has_hump"], found["has_crater"]) == (True, True)
     case = load_case(response / "case.toml")
     results = fpsolve.run(case, response / "results")  # from its record
     assert [each.met for each in compare(case, results)] == [True, False]
-    assert abs(curve["response_amplitude_squared"] - 1.54568) <= curve["response_amplitude_squared_error"]
+    assert (
+        abs(parameter_set["response_amplitude_squared"] - 1.54568) <= parameter_set["response_amplitude_squared_error"]
+    )
 
 
 def test_densities_of_a_response_in_all_files_are_one(response):
     folder = response / "results/case"
-    [curve] = read_json(folder / "summary.json")["curves"]
+    [parameter_set] = read_json(folder / "summary.json")["sets"]
     a, density = np.loadtxt(folder / "response.csv", delimiter=",", skiprows=1).T
     step = a[1] - a[0]
     assert density.sum() * step == pytest.approx(1, abs=2e-3)  # 5e-4 of it is beyond the last amplitude
-    assert (density * a**2).sum() * step == pytest.approx(curve["response_amplitude_squared"], rel=5e-3)
+    assert (density * a**2).sum() * step == pytest.approx(parameter_set["response_amplitude_squared"], rel=5e-3)
     plane, whole = (pyvista.read(folder / f"response{name}.vtu") for name in ("", "_3d"))
     polar = plane["density"].reshape(49, 40).T * a[:, None]  # per amplitude and phase
     assert simpson(polar, dx=math.pi / 48, axis=1) == pytest.approx(density, rel=1e-3)
@@ -397,7 +401,7 @@ def test_why_there_is_no_response_is_told(tmp_path, changes, words):
     text = case_text(RESPONSE.replace("[1.0]", "[0.0]"), **{"noise": THIN, **BOUNCING, **changes})
     done = run(tmp_path, "run", "case.toml", case=text)
     assert (done.code, words in " ".join(done.err.split())) == (0, True), done.err
-    assert read_json(tmp_path / "results/case/summary.json")["curves"][0]["response"] is None
+    assert read_json(tmp_path / "results/case/summary.json")["sets"][0]["response"] is None
 
 
 CUBIC = """title = "A cubic oscillator"
@@ -418,9 +422,11 @@ sigma = 3.0
 
 @pytest.mark.slow
 def test_response_of_equations_has_the_names_of_their_variables_and_agrees_with_paths(tmp_path):
-    [curve] = curves(tmp_path, CUBIC, "--monte-carlo")
+    [parameter_set] = parameter_sets(tmp_path, CUBIC, "--monte-carlo")
     folder = tmp_path / "results/case"
-    means = {name.removeprefix("response_"): each for name, each in curve.items() if name.startswith("response_")}
+    means = {
+        name.removeprefix("response_"): each for name, each in parameter_set.items() if name.startswith("response_")
+    }
     assert {"response.png", "response.pdf", "figure.png"} <= files(folder)
     names = ["amplitude", "amplitude_squared", "amplitude_fourth", "q_squared", "w_squared"]
     assert [*means] == [f"{name}{end}" for name in names for end in ("", "_error")]
@@ -467,8 +473,8 @@ WALL = case_text(
 def test_intervals_and_probabilities_of_an_uncertain_parameter_are_those_of_the_normal_law(tmp_path):
     """λ = a, Λ(p) = pa + p²S(0)/2 and δ_p = −2a/S(0), S(0) = σ²/α²."""
     strength, size = 0.25 / 0.64, norm.ppf(0.975) * 0.05
-    [curve] = curves(tmp_path, UNIFORM, "--report")
-    found = curve["uncertainty"]
+    [parameter_set] = parameter_sets(tmp_path, UNIFORM, "--report")
+    found = parameter_set["uncertainty"]
     for name, value, spread in (
         ("lyapunov_exponent", -0.3, size),
         ("stability_index", 0.6 / strength, 2 * size / strength),
@@ -477,7 +483,7 @@ def test_intervals_and_probabilities_of_an_uncertain_parameter_are_those_of_the_
             [value - spread, value + spread], abs=1e-8
         )
     folder = tmp_path / "results/case"
-    [row] = read_csv(folder / "curves.csv")
+    [row] = read_csv(folder / "sets.csv")
     assert float(row["lyapunov_exponent_low"]) == pytest.approx(-0.3 - size, abs=1e-9)
     first, second = read_csv(folder / "moments.csv")
     assert float(first["moment_high"]) == pytest.approx(-0.3 + strength / 2 + size, abs=1e-9)
@@ -499,20 +505,22 @@ def test_forty_samples_lie_in_the_intervals_as_stated(tmp_path):
     sets = latin_hypercube(case.uncertain.laws(case.problem), 40)
     rows = [",".join(sets), *(",".join(map(repr, map(float, row))) for row in zip(*sets.values(), strict=True))]
     (tmp_path / "sets.csv").write_text("\n".join(rows), encoding="utf-8")
-    [curve] = curves(tmp_path, WALL)
+    [parameter_set] = parameter_sets(tmp_path, WALL)
     text = WALL[: WALL.index("[uncertain]")]
     drawn = solve_case(case_in(tmp_path, text + '[vary]\nfile = "sets.csv"'))
     for name in ("lyapunov_exponent", "stability_index"):
         values = np.array([each.estimates[name].value for each in drawn])
-        spread = curve["uncertainty"][name]
+        spread = parameter_set["uncertainty"][name]
         assert np.mean((values > spread["low"]) & (values < spread["high"])) == pytest.approx(0.95, abs=0.14)
         assert np.std(values) == pytest.approx((spread["high"] - spread["low"]) / (2 * norm.ppf(0.975)), rel=0.15)
 
 
 def test_a_law_of_restitution_that_is_cut_at_1_lowers_the_interval_of_the_exponent(tmp_path):
     """Of r = 0.99 ± 0.02 more than half is cut off, so that its mean is below 0.99."""
-    [curve] = curves(tmp_path, WALL.replace('"noise.tau0" = 0.1\n', ""), "--set", "oscillator.restitution=0.99")
-    spread, value = curve["uncertainty"]["lyapunov_exponent"], curve["lyapunov_exponent"]
+    [parameter_set] = parameter_sets(
+        tmp_path, WALL.replace('"noise.tau0" = 0.1\n', ""), "--set", "oscillator.restitution=0.99"
+    )
+    spread, value = parameter_set["uncertainty"]["lyapunov_exponent"], parameter_set["lyapunov_exponent"]
     assert spread["low"] < value
     assert spread["high"] - value < 0.8 * (value - spread["low"])
 

@@ -71,8 +71,8 @@ def test_simulated_numbers_agree_with_finite_elements_and_are_told_beside_them(t
 def test_a_run_with_a_simulation_has_both_numbers_in_one_table(tmp_path):
     done, written, found = simulated(tmp_path, "--monte-carlo", "--set=output.eigenfunctions=[]", command="run")
     assert {"summary.json", "monte_carlo.json", "figure.png"} <= written
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    for one, other in zip(curve["moments"], found["estimates"], strict=True):
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    for one, other in zip(parameter_set["moments"], found["estimates"], strict=True):
         assert other["value"] is None or abs(one["moment"] - other["value"]) < 5 * other["standard_error"]
     assert all(words in done.out for words in ("finite elements", "s.e. away"))
 
@@ -86,7 +86,7 @@ def test_options_of_a_simulation_replace_those_of_the_case(tmp_path):
 
 
 @pytest.mark.slow
-def test_each_curve_has_its_file_and_those_of_an_earlier_simulation_go(tmp_path):
+def test_each_set_has_its_file_and_those_of_an_earlier_simulation_go(tmp_path):
     _, written, found = simulated(tmp_path, *QUICK, TWO)
     assert written == {"monte_carlo.json", "monte_carlo-2.json"}
     assert found["varied"] == {"noise.D0": 0.1}
@@ -137,7 +137,7 @@ def test_an_interrupted_simulation_of_a_run_keeps_what_is_solved(tmp_path):
     case = case_in(tmp_path, CASE, ["output.quantities=['moment']", "output.figure=false"])
     with pytest.raises(KeyboardInterrupt, match=r"interrupted; what was solved is kept in .*; run it again to go on"):
         run_case(case, tmp_path / "results", monte_carlo=True, watch=interrupted(0))
-    assert read_json(tmp_path / "results/test/summary.json")["curves"][0]["moments"]
+    assert read_json(tmp_path / "results/test/summary.json")["sets"][0]["moments"]
 
 
 def test_a_response_that_is_interrupted_is_said_to_be_missing(tmp_path):
@@ -192,6 +192,6 @@ def test_a_signal_ends_a_long_simulation_soon_with_a_whole_file_or_none(tmp_path
             raise
     assert (process.returncode, time.monotonic() - begun < 20) == (130, True)
     is_kept = "what was done is kept" in err
-    assert is_kept or "interrupted after 0 of 1 curve" in err
+    assert is_kept or "interrupted after 0 of 1 parameter set" in err
     assert names(tmp_path / "results/case") == ({"monte_carlo.json"} if is_kept else set())
     assert not is_kept or read_json(tmp_path / "results/case/monte_carlo.json")["paths"] == 400_000

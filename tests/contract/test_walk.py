@@ -10,7 +10,7 @@ PROGRAM = """
 import sys, fpsolve
 from fpsolve.fem import write_mesh
 case, called = fpsolve.load_case(sys.argv[1]), set()
-problem = next(case.curves()).problem
+problem = next(case.sets()).problem
 sys.setprofile(lambda frame, event, argument: called.add(frame.f_code.co_qualname))
 fpsolve.moment_lyapunov(problem, 2.0)
 print(*called)

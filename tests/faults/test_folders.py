@@ -9,7 +9,7 @@ from tests.kit import LIST, case_text, files, put, run
 
 SECTIONS = "[moments]\np = [2.0]\n[output]\nfigure = false\nquantities = ['lyapunov_exponent']\n"
 CASE = case_text(SECTIONS + "[monte_carlo]\npaths = 6400\ntime = 20.0\n")
-OF_RUN = {"summary.json", "moments.csv", "curves.csv", "results.nc"}
+OF_RUN = {"summary.json", "moments.csv", "sets.csv", "results.nc"}
 OF_COMMAND = {"run": OF_RUN, "simulate": {"monte_carlo.json"}}
 OTHERS = {"chart.json", "chart.csv", "chart.png", "proof.json", "design.json"}
 ALL = OF_RUN | OF_COMMAND["simulate"] | OTHERS

@@ -72,18 +72,18 @@ def lines(folder, out):
 
 def summary(folder, out):
     found = kit.read_json(folder / out / "sweep/summary.json")
-    return {**found, "curves": [{**curve, "seconds": 0} for curve in found["curves"]]}
+    return {**found, "sets": [{**parameter_set, "seconds": 0} for parameter_set in found["sets"]]}
 
 
 def assert_same_results(folder, out, other="whole"):
-    """results.nc bit for bit, but for seconds and times; and the curves of summary.json.
+    """results.nc bit for bit, but for seconds and times; and the parameter sets of summary.json.
 
     A set that was cut between two p has several records. It begins anew at the others, so that its numbers are the same
     within their errors.
     """
     records = Counter(line.split(b'"')[3] for line in lines(folder, out) if sets([line]))
-    curves = load_case(folder / "sweep.toml").curves()
-    cut = [each.number - 1 for each in curves if records[each.digest.encode()] > 1]
+    parameter_sets = load_case(folder / "sweep.toml").sets()
+    cut = [each.number - 1 for each in parameter_sets if records[each.digest.encode()] > 1]
     paths = [folder / each / "sweep/results.nc" for each in (out, other)]
     with xr.open_dataset(paths[0]) as one, xr.open_dataset(paths[1]) as two:
         is_cut = np.isin(np.arange(one.status.size).reshape(one.status.shape), cut)
@@ -97,8 +97,8 @@ def assert_same_results(folder, out, other="whole"):
         kept = [{key: value for key, value in each.attrs.items() if key not in PASSING} for each in (one, two)]
         assert kept[0] == kept[1]
         assert one.attrs["complete"] == 1
-    curves = zip(summary(folder, out)["curves"], summary(folder, other)["curves"], strict=True)
-    assert all(one == two for k, (one, two) in enumerate(curves) if k not in cut)
+    parameter_sets = zip(summary(folder, out)["sets"], summary(folder, other)["sets"], strict=True)
+    assert all(one == two for k, (one, two) in enumerate(parameter_sets) if k not in cut)
     assert not any((folder / out).rglob(".fpsolve-*"))
 
 
@@ -167,10 +167,12 @@ def test_sweep_that_ends_early_keeps_what_is_solved_and_the_same_command_goes_on
     done, is_full = lines(place, name), name == "a full disk"
     assert (1 if is_full else 3) <= len(sets(done)) < SIZE**2
     if words and not is_full:
-        left, whole = summary(place, name), summary(place, "whole")["curves"]
+        left, whole = summary(place, name), summary(place, "whole")["sets"]
         assert not left["complete"]
-        assert 1 <= left["done"] <= len(left["curves"]) <= len(sets(done))
-        assert left["done"] <= sum(curve in whole for curve in left["curves"])  # of others a part is known
+        assert 1 <= left["done"] <= len(left["sets"]) <= len(sets(done))
+        assert left["done"] <= sum(
+            parameter_set in whole for parameter_set in left["sets"]
+        )  # of others a part is known
     for _ in range(200):
         if not any((PROC / f"{each}").exists() for each in workers):
             break
@@ -201,7 +203,7 @@ def test_sweep_killed_at_any_moment_leaves_whole_files(place):
         if (place / out / "sweep/summary.json").exists():
             left = summary(place, out)
             assert left["complete"] == (left["done"] == left["planned"])
-            assert len(left["curves"]) >= left["done"]  # of others a part is known
+            assert len(left["sets"]) >= left["done"]  # of others a part is known
     run(place, out, "--jobs", "1")
     assert_same_results(place, out)
 

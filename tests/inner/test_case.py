@@ -64,4 +64,4 @@ def test_a_case_is_written_with_another_value_wherever_it_states_it(tmp_path, na
     for key in case.problem.differentiable:
         value = float(case.problem.values[key]) * 0.99 or 0.01
         (tmp_path / "new.toml").write_text(rewritten(case, tmp_path, {key: value}), encoding="utf-8")
-        assert next(load_case(tmp_path / "new.toml").curves()).parameters == {**case.problem.values, key: value}
+        assert next(load_case(tmp_path / "new.toml").sets()).parameters == {**case.problem.values, key: value}

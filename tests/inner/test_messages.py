@@ -76,7 +76,7 @@ def test_messages_that_differ_in_numbers_only_are_of_one_kind():
         "code": Message(Code.NOT_SOLVED, **one.data),
     }
     assert {name for name, other in others.items() if other.kind == one.kind} == {"numbers"}
-    assert Message(Code.INDEX_FAILED, symbols=["λ"]).kind != Message(Code.INDEX_FAILED, symbols=["λ", "N"]).kind
+    assert Message(Code.NUMBER_FAILED, symbols=["λ"]).kind != Message(Code.NUMBER_FAILED, symbols=["λ", "N"]).kind
     drawn = Message(Code.NEGATIVE_DENSITY, name="density", p=0.0, size=0.2)
     assert Message(Code.NOTHING_DRAWN, reason=drawn).size == 0.2
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.exponent.quantities import INDICES
+from fpsolve.exponent.quantities import SUMMARY_NUMBERS
 from fpsolve.results import Table
-from fpsolve.solve.curve import CurveResult, MomentColumns
+from fpsolve.solve.set_result import MomentColumns, SetResult
 from fpsolve.tell.figures import coloured_by, main_figure
 from fpsolve.theory.perturbation import second_order
 from tests.conftest import sampled
@@ -38,8 +38,8 @@ def drawn(pictures, monkeypatch, tmp_path):
 
     def draw(*sets, fails=()):
         case, results = case_in(tmp_path, FIGURED, sets), []
-        for curve in case.curves():
-            theory, p = second_order(curve.problem), case.p[: 0 if curve.number in fails else None]
+        for parameter_set in case.sets():
+            theory, p = second_order(parameter_set.problem), case.p[: 0 if parameter_set.number in fails else None]
             value, slope, nothing = (
                 theory.moment_exponent(p),
                 (theory.moment_exponent(p + 1) - theory.moment_exponent(p - 1)) / 2,
@@ -52,7 +52,7 @@ def drawn(pictures, monkeypatch, tmp_path):
             }
             told = () if p.size else (Failure(None, "it was too hard"),)
             columns = MomentColumns(p, value, slope, nothing, nothing, nothing, value)
-            results.append(CurveResult(curve, columns, dict.fromkeys(INDICES) | known, failures=told))
+            results.append(SetResult(parameter_set, columns, dict.fromkeys(SUMMARY_NUMBERS) | known, failures=told))
         main_figure(case, results, [], Table(case, results)).write(tmp_path)
         return figures[-1]
 

@@ -49,7 +49,7 @@ def test_figure_marks_each_index_on_the_zero_line_and_each_exponent_as_a_tangent
     sets = [many(3), "figure.mark=['stability_index', 'lyapunov_exponent']", "oscillator.omega=0.5"]
     [axes] = drawn(*sets).axes
     case = case_in(tmp_path, TEXT, sets)
-    theories = [second_order(curve.problem) for curve in case.curves()]
+    theories = [second_order(parameter_set.problem) for parameter_set in case.sets()]
     paths = [each.get_xydata() for each in axes.lines if each.get_gid() is None and len(each.get_xdata()) == 2]
     slopes = [np.subtract(*path[:, 1]) / np.subtract(*path[:, 0]) for path in paths]
     np.testing.assert_allclose(slopes, [each.lyapunov_exponent for each in theories])

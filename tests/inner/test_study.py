@@ -10,12 +10,12 @@ import pytest
 from fpsolve import ExponentSolver, load_case
 from fpsolve.commands import run_case
 from fpsolve.errors import NotConverged
-from fpsolve.exponent import INDICES
+from fpsolve.exponent import SUMMARY_NUMBERS
 from fpsolve.messages import message_of
 from fpsolve.results import Table, table
 from fpsolve.simulation.estimators import MomentEstimate, MonteCarlo
 from fpsolve.simulation.response import Response
-from fpsolve.solve import QUESTIONS, indices, simulate
+from fpsolve.solve import QUESTIONS, simulate, summary_numbers
 from fpsolve.solve import sets as solve
 from fpsolve.solve.records import made, packed, plain, unpacked
 from tests.contract.test_cases import CASES, ROOT
@@ -28,24 +28,24 @@ MINIMAL = CASES / "minimal.toml"
 @pytest.mark.slow
 def test_quantity_and_question_of_the_pages_are_solved_and_tabulated(monkeypatch):
     """The chance that Gaussian noise is above a level, as the complementary error function has it."""
-    index = typed(ROOT / "docs/contributing.md")[0]["index"]
+    summary_number = typed(ROOT / "docs/contributing.md")[0]["summary_number"]
     chance = typed(ROOT / "docs/extending.md")[0]["question"]
-    question = indices.question_of(index)
-    monkeypatch.setitem(INDICES, index.name, index)
+    question = summary_numbers.question_of(summary_number)
+    monkeypatch.setitem(SUMMARY_NUMBERS, summary_number.name, summary_number)
     for module in (solve, table):
         monkeypatch.setattr(module, "QUESTIONS", (*QUESTIONS, question, chance))
     for each in (question, chance):
         monkeypatch.setitem(solve.BY_NAME, each.name, each)
     case = load_case(MINIMAL)
-    output = case.output.model_copy(update={"quantities": (index.name, chance.name)})
+    output = case.output.model_copy(update={"quantities": (summary_number.name, chance.name)})
     case = case.model_copy(update={"output": output})
     [solved] = solve_sets(case)
     expected = 0.5 * math.erfc(1.0 / (math.sqrt(2) * case.problem.noise.standard_deviation))
-    for result in (solved.result, from_record(case, solved.result.curve, read_again(solved.record))):
+    for result in (solved.result, from_record(case, solved.result.parameter_set, read_again(solved.record))):
         assert result.parts[chance.name].value == pytest.approx(expected, rel=1e-8)
         row, solver = Table(case, [result]).row(1), ExponentSolver(case.problem)
-        assert row.keys() >= {index.name, f"{index.name}_error", chance.name}
-        assert row[index.name] == pytest.approx(index.solve(solver).value, rel=1e-6)
+        assert row.keys() >= {summary_number.name, f"{summary_number.name}_error", chance.name}
+        assert row[summary_number.name] == pytest.approx(summary_number.solve(solver).value, rel=1e-6)
 
 
 RESULT = MonteCarlo(
@@ -98,13 +98,13 @@ def test_a_simulation_comes_back_from_its_record_to_the_last_bit(rng):
     assert bits(made(form, record)) == bits((replace(RESULT, time=0.3), None, (), False))
 
 
-def test_a_simulation_that_fails_keeps_the_curves_before_it(tmp_path, monkeypatch):
+def test_a_simulation_that_fails_keeps_the_sets_before_it(tmp_path, monkeypatch):
     original = simulate.simulation_of
 
-    def failing(curve, **asked):
-        if curve.number == 2:
+    def failing(parameter_set, **asked):
+        if parameter_set.number == 2:
             raise NotConverged("the simulation overflowed")
-        return original(curve, **asked)
+        return original(parameter_set, **asked)
 
     monkeypatch.setattr("fpsolve.commands.simulate.simulation_of", failing)
     text = "[moments]\np = [1.0]\n[output]\nquantities = ['moment']\n[monte_carlo]\npaths = 32\ntime = 40.0\n"

@@ -49,14 +49,14 @@ def test_key_of_a_part_follows_from_what_its_numbers_follow_from(change, parts):
 
 
 def test_keys_of_sets_and_simulations_differ(tmp_path):
-    curve, other = case_in(tmp_path, TEXT).curves()
+    parameter_set, other = case_in(tmp_path, TEXT).sets()
     setting = MonteCarloSection()
     settings = [setting, *(setting.model_copy(update=each) for each in ({"seed": 7}, {"paths": 5000}))]
-    found = [simulation_key(curve, (1.0, 2.0), each) for each in settings]
+    found = [simulation_key(parameter_set, (1.0, 2.0), each) for each in settings]
     found += [
-        simulation_key(curve, (1.0,), setting),
+        simulation_key(parameter_set, (1.0,), setting),
         simulation_key(other, (1.0, 2.0), setting),
-        curve.digest,
+        parameter_set.digest,
         other.digest,
     ]
     assert len(set(found)) == len(found)
@@ -73,14 +73,14 @@ def raising(failure):
     ("place", "command", "message"),
     [
         ("fpsolve.commands.cases.Sweep", "run", "interrupted"),
-        ("fpsolve.solve.sets.solve_curve", "run", "interrupted after 0 of 2 parameter sets; run it again to go on"),
+        ("fpsolve.solve.sets.solve_set", "run", "interrupted after 0 of 2 parameter sets; run it again to go on"),
         (
-            "fpsolve.solve.sets.solve_curve",
+            "fpsolve.solve.sets.solve_set",
             "check",
             "interrupted after 0 of 2 parameter sets; run it again to start over",
         ),
         (
-            "fpsolve.commands.cases.write_curves",
+            "fpsolve.commands.cases.write_sets",
             "run",
             "interrupted after 2 of 2 parameter sets; what was done is kept in results/case; run it again to go on",
         ),
@@ -110,8 +110,9 @@ def test_an_interrupt_keeps_what_is_found_of_a_set_under_way(tmp_path, monkeypat
         130,
         "interrupted after 0 of 2 parameter sets; what was done is kept in results/case; run it again to go on",
     )
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    assert (len(curve["moments"]), curve["lyapunov_exponent"] is None, curve["variance_rate"]) == (3, False, None)
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    assert (len(parameter_set["moments"]), parameter_set["variance_rate"]) == (3, None)
+    assert parameter_set["lyapunov_exponent"] is not None
 
 
 class Elsewhere(Executor):
@@ -154,7 +155,7 @@ def test_pictures_come_back_from_machines_that_share_no_folder(tmp_path):
     ],
 )
 def test_a_failure_to_write_is_one_sentence(tmp_path, monkeypatch, failure, said):
-    monkeypatch.setattr("fpsolve.solve.sets.solve_curve", raising(failure))
+    monkeypatch.setattr("fpsolve.solve.sets.solve_set", raising(failure))
     done = run(tmp_path, "check", "case.toml", case=TEXT)
     assert (done.code, done.err.count("\n"), done.err.startswith(said)) == (2, 1, True)
 
@@ -172,23 +173,23 @@ def test_a_quantity_that_fails_takes_no_other_with_it(tmp_path, monkeypatch, fai
         monkeypatch.setattr(place, raising(failure))
     sets = "vary={}", "moments.p=[2.0]", "oscillator.c2=0.5"
     done = run(tmp_path, "run", "case.toml", "--all", *(f"--set={each}" for each in sets), case=TEXT)
-    [curve] = read_json(tmp_path / "results/case/summary.json")["curves"]
-    assert (done.code, curve["status"], curve["variance_rate"]) == (3, "partly", None)
-    assert any(each.startswith(f"fpsolve found no response: {said}") for each in curve["warnings"])
-    assert all(curve[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
+    [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
+    assert (done.code, parameter_set["status"], parameter_set["variance_rate"]) == (3, "partly", None)
+    assert any(each.startswith(f"fpsolve found no response: {said}") for each in parameter_set["warnings"])
+    assert all(parameter_set[name] for name in ("lyapunov_exponent", "stability_index", "moments"))
 
 
-def test_many_curves_have_no_summary(tmp_path, monkeypatch):
-    """All is in curves.csv and results.nc."""
+def test_many_sets_have_no_summary(tmp_path, monkeypatch):
+    """All is in sets.csv and results.nc."""
     asked = ["run", "case.toml", "--quiet", "--jobs", "1", "--set", "output={ figure=false, quantities=['moment'] }"]
     place = tmp_path / "results/case/summary.json"
     assert run(tmp_path, *asked, case=TEXT).code == 0
-    few = read_json(place)["curves"]
+    few = read_json(place)["sets"]
     monkeypatch.setattr("fpsolve.results.csv_json.MOST_SUMMARISED", 1)
-    assert json.loads(run(tmp_path, *asked, "--json").out)["curves"] == few
+    assert json.loads(run(tmp_path, *asked, "--json").out)["sets"] == few
     assert not place.exists()
     told = ["; ".join([*each["warnings"], *each["notes"]]) for each in few]
-    assert told == [row["messages"] for row in read_csv(place.with_name("curves.csv"))]
+    assert told == [row["messages"] for row in read_csv(place.with_name("sets.csv"))]
     assert told == open_results(place.parent).messages.values[::3].tolist()
 
 

@@ -241,7 +241,7 @@ def of_moment(p):
     return lambda problem: float(moment_lyapunov(problem, p, rtol=HIGH).value[0])
 
 
-INDICES = {
+SUMMARY_NUMBERS = {
     "lyapunov_exponent": lambda problem: lyapunov_exponent(problem, rtol=HIGH).value,
     "stability_index": lambda problem: stability_index(problem, rtol=HIGH).value,
     "variance_rate": lambda problem: ExponentSolver(problem, rtol=HIGH).variance_rate().value,
@@ -279,7 +279,7 @@ def test_sensitivities_of_a_moment_are_differences(problem, p):
 def test_index_of_two_parts_that_do_not_mix_has_no_sensitivities():
     """ẋ = v, v̇ = −ξv: Λ(p) = max(0, ½ p² s²), of which δ_p = 0 is where both parts have λ = 0."""
     found = sensitivities(rates("x' = v; v' = -xi*v", White(s=0.2)), 2.0, rtol=1e-4)
-    assert "stability_index" not in {name for name, slopes in found.indices.items() if slopes}
+    assert "stability_index" not in {name for name, slopes in found.summary_numbers.items() if slopes}
     assert any("δ_p" in str(note) and "do not mix" in str(note) for note in found.notes)
 
 
@@ -300,9 +300,9 @@ def test_index_of_two_parts_that_do_not_mix_has_no_sensitivities():
 def test_sensitivities_of_indices_are_differences(problem, keys):
     """The last has δ_p near 0, which takes ∂Λ/∂θ / p from its derivatives at p = 0."""
     told = []
-    found = sensitivities(problem, rtol=HIGH, progress=lambda: told.append(1)).indices
+    found = sensitivities(problem, rtol=HIGH, progress=lambda: told.append(1)).summary_numbers
     assert len(told) == len(found) == 3
-    for name, value in INDICES.items():
+    for name, value in SUMMARY_NUMBERS.items():
         for key in keys:
             assert found[name][key].value == pytest.approx(difference(problem, key, value), rel=1e-5, abs=1e-9), (
                 name,
@@ -334,7 +334,7 @@ def test_sensitivities_of_the_exact_moment_and_of_units():
 @pytest.mark.slow
 def test_sensitivities_of_the_exponent_under_algebraic_tails_are_within_their_errors():
     problem = oscillator(NonGaussianNoise(D0=0.6, tau0=0.8, r0=1.1), restitution=0.8)
-    found, finer = (sensitivities(problem, [], rtol=rtol).indices["lyapunov_exponent"] for rtol in (1e-7, 1e-8))
+    found, finer = (sensitivities(problem, [], rtol=rtol).summary_numbers["lyapunov_exponent"] for rtol in (1e-7, 1e-8))
     for key, estimate in found.items():
         assert abs(estimate.value - finer[key].value) <= estimate.error_estimate + finer[key].error_estimate, key
     expected = difference(problem, "noise.r0", lambda each: lyapunov_exponent(each).value)
@@ -345,7 +345,7 @@ def test_a_finer_mesh_beyond_the_budget_costs_the_sensitivities_that_need_it_alo
     problem = oscillator(NonGaussianNoise(D0=0.5, tau0=1.0, r0=1.2), omega=1.0, restitution=0.8, c1=0.1, epsilon=0.3)
     budget = Budget(unknowns=ExponentSolver(problem, rtol=1e-3).pair(0.0).generator.size)
     found = sensitivities(problem, [], rtol=1e-3, budget=budget)
-    assert "lyapunov_exponent" not in found.indices
+    assert "lyapunov_exponent" not in found.summary_numbers
     assert any("Λ(0) was not found on a finer mesh: it needs" in note for note in found.notes)
 
 

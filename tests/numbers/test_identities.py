@@ -372,7 +372,7 @@ def test_sensitivities_are_differences(name):
         difference = (values(high, p)[0] - values(low, p)[0]) / (2 * step)
         assert slope.value == pytest.approx(difference, rel=1e-6, abs=1e-6), key
         if name == "blocks":
-            rate = found.indices["lyapunov_exponent"][key]
+            rate = found.summary_numbers["lyapunov_exponent"][key]
             ends = [lyapunov_exponent(each, rtol=1e-10).value for each in (low, high)]
             assert rate.value == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-6, abs=1e-6), key
 

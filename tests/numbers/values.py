@@ -154,7 +154,7 @@ def slope_by(key: str, p: float, **options: Any) -> Quantity:
 
     def solved(problem: Problem) -> tuple[float, float]:
         found = sensitivities(problem, p or 1.0, **options)
-        by = found.moments[0] if p else found.indices["lyapunov_exponent"]
+        by = found.moments[0] if p else found.summary_numbers["lyapunov_exponent"]
         return by[key].value, by[key].error_estimate
 
     return Quantity(f"∂Λ({p:g})/∂{key}", solved)

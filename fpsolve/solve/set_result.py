@@ -1,4 +1,4 @@
-"""What is found for the curves of a case: plain values."""
+"""What is found for the parameter sets of a case: plain values."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 from fpsolve.analysis.excursions import Excursion
 from fpsolve.analysis.sensitivity import Sensitivities
 from fpsolve.arrays import FloatArray, ReadOnly
-from fpsolve.case.case import Curve
+from fpsolve.case.case import ParameterSet
 from fpsolve.case.sections import EXCURSIONS, RESPONSE, SAME, SENSITIVITIES
 from fpsolve.data import Quantity, Result, dataset
 from fpsolve.exponent.error import Estimate, Failure
-from fpsolve.exponent.quantities import INDICES, LYAPUNOV_EXPONENT, STABILITY_INDEX, VARIANCE_RATE
+from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, STABILITY_INDEX, SUMMARY_NUMBERS, VARIANCE_RATE
 from fpsolve.messages import Code, Message, Severity, message_of
 from fpsolve.model.quantity import MOMENT, OVER_P, P, moment_at
 from fpsolve.nonlinear.rest import NearRest
@@ -37,7 +37,7 @@ class Status(IntEnum):
     FAILED = 2
     MISSING = 3
     BEYOND_RTOL = 4
-    NO_INDEX = 5
+    NO_SUMMARY_NUMBER = 5
 
     @property
     def word(self) -> str:
@@ -50,7 +50,7 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class MomentColumns(ReadOnly):
-    """Λ(p) at those p of a curve that did not fail, in the order of the case; all of shape (n,).
+    """Λ(p) at those p of a parameter set that did not fail, in the order of the case; all of shape (n,).
 
     Attributes:
         p: the moments.
@@ -73,7 +73,7 @@ class MomentColumns(ReadOnly):
 
 
 Number = float | FloatArray | None
-"""What a quantity is of one curve, or at each of its p; None where there is none."""
+"""What a quantity is of one parameter set, or at each of its p; None where there is none."""
 
 
 def estimated(quantity: Quantity, estimate: Estimate | None) -> dict[Quantity, Number]:
@@ -113,7 +113,7 @@ class ResponseDensity(ReadOnly):
 
 
 @dataclass(frozen=True, eq=False)
-class CurveResponse(NearRest):
+class SetResponse(NearRest):
     """The stationary response of one parameter set.
 
     Attributes:
@@ -142,20 +142,20 @@ class CurveResponse(NearRest):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CurveResult(Result):
+class SetResult(Result):
     """The numbers and messages of one parameter set, which a record can hold.
 
     Attributes:
-        curve: the parameters, the oscillator and the noise.
+        parameter_set: the parameters, the oscillator and the noise.
         moments: Λ(p); where some p failed, of the others.
         parts: what else was found, by the names of `Question`s; without what is not wanted, or did not converge.
         warnings: what limits these numbers.
         notes: where the theories compared with are not valid.
-        failures: why some p are missing, or with all p some indices.
+        failures: why some p are missing, or with all p some summary numbers.
         seconds: how long the processor took.
     """
 
-    curve: Curve
+    parameter_set: ParameterSet
     moments: MomentColumns
     parts: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[Message, ...] = ()
@@ -165,8 +165,8 @@ class CurveResult(Result):
 
     @property
     def estimates(self) -> Mapping[str, Estimate | None]:
-        """Of each of the `INDICES`, by its name; None where there is none, it was not asked for, or not found."""
-        return {name: self.parts.get(name) for name in INDICES}
+        """The `SUMMARY_NUMBERS` by their names; None where there is none, it was not asked for, or not found."""
+        return {name: self.parts.get(name) for name in SUMMARY_NUMBERS}
 
     @property
     def discretisation(self) -> dict[str, Any] | None:
@@ -179,7 +179,7 @@ class CurveResult(Result):
         return self.parts.get(EXCURSIONS)
 
     @property
-    def response(self) -> CurveResponse | None:
+    def response(self) -> SetResponse | None:
         """The stationary response of a system with terms of degree 3."""
         return self.parts.get(RESPONSE)
 
@@ -216,9 +216,9 @@ class CurveResult(Result):
         if self.failures:
             return Status.PARTLY if self.moments.p.size or any(self.estimates.values()) else Status.FAILED
         codes = {message_of(each).code for each in self.warnings}
-        if not codes.isdisjoint((Code.RTOL_MISSED, Code.INDEX_RTOL_MISSED)):
+        if not codes.isdisjoint((Code.RTOL_MISSED, Code.NUMBER_RTOL_MISSED)):
             return Status.BEYOND_RTOL
-        return Status.NO_INDEX if Code.INDEX_MISSING in codes else Status.CONVERGED
+        return Status.NO_SUMMARY_NUMBER if Code.NUMBER_MISSING in codes else Status.CONVERGED
 
     @property
     def remarks(self) -> dict[Severity, Sequence[str]]:
@@ -227,34 +227,34 @@ class CurveResult(Result):
         return {Severity.FAILURE: reasons, Severity.WARNING: self.warnings, Severity.NOTE: self.notes}
 
     def to_xarray(self) -> xarray.Dataset:
-        """Λ(p) and Λ′(p) over p, Eq. (37), and the indices that were found, with their errors."""
+        """Λ(p) and Λ′(p) over p, Eq. (37), and the summary numbers that were found, with their errors."""
         found = self.moments
         numbers: dict[Quantity, Number] = {each: vars(found)[name] for name, each in OVER_P.items()}
         for name, each in self.estimates.items():
-            numbers |= estimated(INDICES[name], each) if each else {}
-        title, places = f"{MOMENT.words}, {self.curve.label}".removesuffix(", "), {P: found.p}
+            numbers |= estimated(SUMMARY_NUMBERS[name], each) if each else {}
+        title, places = f"{MOMENT.words}, {self.parameter_set.label}".removesuffix(", "), {P: found.p}
         more = {"warnings": self.warnings, "notes": self.notes, "failures": [each.reason for each in self.failures]}
-        return dataset(title, "finite elements", numbers, places, self.curve.parameters, **more)
+        return dataset(title, "finite elements", numbers, places, self.parameter_set.parameters, **more)
 
     def _said(self) -> str:
         found, exponent = self.moments, self.lyapunov_exponent
-        parts = [self.curve.label, self.status.word, f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
+        parts = [self.parameter_set.label, self.status.word, f"{found.p.size} p", f"λ = {exponent}" if exponent else ""]
         return ", ".join(filter(None, parts))
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedCurve:
+class SimulatedSet:
     """The simulation of one parameter set.
 
     Attributes:
-        curve: the parameter set.
+        parameter_set: the parameter set.
         result: λ and Λ(p) of the linear system.
         response: the stationary response of the nonlinear system; None where there is none.
         warnings: what limits these numbers.
         interrupted: whether the simulation was stopped early.
     """
 
-    curve: Curve
+    parameter_set: ParameterSet
     result: MonteCarlo
     response: Response | None
     warnings: tuple[Message, ...]

@@ -1,4 +1,4 @@
-"""Several curves in one table, a row each: what varies, λ, δ_p, what else is asked for; of many the extreme ones."""
+"""Several sets in one table, a row each: what varies, λ, δ_p, what else is asked for; of many the extreme ones."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ import numpy as np
 
 from fpsolve.analysis.spreads import LEVEL, UNCERTAIN
 from fpsolve.arrays import FloatArray
-from fpsolve.case.case import Case, Curve
+from fpsolve.case.case import Case, ParameterSet
 from fpsolve.case.sections import EXCURSIONS, RESPONSE
 from fpsolve.data import short_names, written
 from fpsolve.exponent.quantities import LYAPUNOV_EXPONENT, MOMENT, STABILITY_INDEX
 from fpsolve.model.quantity import MEAN_SQUARE, STATUS, moment_at
 from fpsolve.results.table import Table
-from fpsolve.solve.curve import CurveResult, Status
 from fpsolve.solve.intervals import spreads_of
+from fpsolve.solve.set_result import SetResult, Status
 from fpsolve.tell.blocks import Block, Column, Grid, Sentence, filled
-from fpsolve.tell.numbers import STAR, bounds_text, index_text, told_indices
+from fpsolve.tell.numbers import STAR, bounds_text, summary_number_text, told_summary_numbers
 from fpsolve.tell.text import (
     DIGITS,
     EACH,
@@ -37,26 +37,26 @@ from fpsolve.tell.text import (
 )
 
 MAIN = LYAPUNOV_EXPONENT, STABILITY_INDEX
-"""The indices that come first, and that have a column over a parameter."""
+"""The summary numbers that come first, and that have a column over a parameter."""
 THEORY = "Eqs. (38)-(39): perturbation theory"
 """The remark on the columns of closed forms."""
 
 
-class _OfCurve(Protocol):
-    """What was found of a curve."""
+class _OfSet(Protocol):
+    """What was found of a parameter set."""
 
     @property
-    def curve(self) -> Curve: ...
+    def parameter_set(self) -> ParameterSet: ...
 
 
-F = TypeVar("F", bound=_OfCurve)
+F = TypeVar("F", bound=_OfSet)
 Cells = Iterable[tuple[Column, str]]
-"""Columns, each with what stands there of one curve."""
+"""Columns, each with what stands there of one parameter set."""
 
 
-def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[Block]:
-    """What was solved of each curve in one grid, and of many curves how many converged."""
-    yield curve_grid(case, results, table)
+def show(case: Case, results: Sequence[SetResult], table: Table) -> Iterator[Block]:
+    """What was solved of each parameter set in one grid, and of many parameter sets how many converged."""
+    yield set_grid(case, results, table)
     if len(results) <= EACH:
         return
     counts = Counter(_states(table))
@@ -65,23 +65,23 @@ def show(case: Case, results: Sequence[CurveResult], table: Table) -> Iterator[B
     states = ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count)
     is_short = len(results) > ROWS and failed > FAILURES
     shown = f"; the table has the first {FAILURES} that are not converged" if is_short else ""
-    yield Sentence(f"{len(results)} parameter sets: {states}{shown}; all numbers are in curves.csv and results.nc")
+    yield Sentence(f"{len(results)} parameter sets: {states}{shown}; all numbers are in sets.csv and results.nc")
 
 
 def _states(table: Table) -> list[Status]:
-    """Of all curves of which anything is known."""
+    """Of all parameter sets of which anything is known."""
     values = table[STATUS.name].values
     return [Status(int(each)) for each in values[~np.isnan(values)].tolist()]
 
 
-def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid:
-    """What was solved of each curve, beside perturbation theory.
+def set_grid(case: Case, results: Sequence[SetResult], table: Table) -> Grid:
+    """What was solved of each parameter set, beside perturbation theory.
 
     Args:
-        table: the numbers of all curves.
+        table: the numbers of all parameter sets.
     """
     status = table[STATUS.name].values
-    known, told = ~np.isnan(status), told_indices(case)
+    known, told = ~np.isnan(status), told_summary_numbers(case)
     numbers = {each.symbol: table[each.name].values for each in told}
     for p in _told_moments(case):
         numbers[moment_at(p).symbol] = table[MOMENT.name].values[:, np.flatnonzero(case.p == p)[0]]
@@ -89,7 +89,7 @@ def curve_grid(case: Case, results: Sequence[CurveResult], table: Table) -> Grid
     failed = [place for place, each in enumerate(_states(table)) if each.fails]
     has_status = any(status[known])
 
-    def cells(result: CurveResult) -> Cells:
+    def cells(result: SetResult) -> Cells:
         yield from _numbers(case, result)
         yield Column("status"), result.status.word if has_status else ""
 
@@ -110,12 +110,12 @@ def grid_of(
     numbers: Mapping[str, FloatArray] = MappingProxyType({}),
     failed: Sequence[int] = (),
 ) -> Grid:
-    """A row for what was found of each curve, or of more than `ROWS` for the extreme and the first `failed` ones.
+    """A row for what was found of each set, or of more than `ROWS` for the extreme and the first `failed` ones.
 
     Args:
-        cells: of one curve.
-        numbers: by their headings those of all curves whose extreme ones are sought, NaN where there is none.
-        failed: the places of the curves that failed.
+        cells: of one parameter set.
+        numbers: by their headings those of all parameter sets whose extreme ones are sought, NaN where there is none.
+        failed: the places of the parameter sets that failed.
     """
     if len(found) <= ROWS:
         reasons: dict[int, list[str]] = {place: [] for place in range(len(found))}
@@ -127,42 +127,42 @@ def grid_of(
                     reasons.setdefault(int(most(values)), []).append(f"{word} {heading}")
     keys, which, rows = [*map(Column, short_names(case.vary.keys))], Column("which", is_text=True), []
     for place, told in sorted(reasons.items()):
-        varied = [written(each) for each in found[place].curve.varied.values()]
+        varied = [written(each) for each in found[place].parameter_set.varied.values()]
         rows.append([*zip(keys, varied, strict=True), *cells(found[place]), (which, ", ".join(told))])
     columns = [column for column, _ in rows[0]] if rows else []
     return filled(case.headline, columns, [[text for _, text in row] for row in rows], keep=numbers)
 
 
 def _told_moments(case: Case) -> list[float]:
-    """The p whose Λ(p) has a column: all of few, or else 2; where no index is told the first and the last one."""
+    """The p whose Λ(p) has a column: all of few, or else 2; without summary numbers the first and last."""
     p = [float(each) for each in case.p if each] if MOMENT.name in case.asked else []
     if len(p) > MOMENTS:
-        p = [2.0] if 2.0 in p else [] if told_indices(case) else [p[0], p[-1]]
+        p = [2.0] if 2.0 in p else [] if told_summary_numbers(case) else [p[0], p[-1]]
     return p
 
 
-def _numbers(case: Case, result: CurveResult) -> Cells:
-    """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the other indices."""
-    over_p, told, spreads = case.figure.x == "p", told_indices(case), spreads_of(case, result).indices
+def _numbers(case: Case, result: SetResult) -> Cells:
+    """What has a column, the most important first: λ, δ_p, Λ at 2 or at the p of a case if few, the others."""
+    over_p, told, spreads = case.figure.x == "p", told_summary_numbers(case), spreads_of(case, result).summary_numbers
     lost = [each for each in told if result.estimates[each.name] is None] if result.status.fails else []
-    texts = {each: "" if each in lost else index_text(each, result, DIGITS) for each in told}
-    for index in [each for each in told if each in MAIN]:
-        yield Column(index.symbol), texts[index]
-        is_second = index == STABILITY_INDEX
-        yield Column(f"± {index.symbol}", 3 if is_second else 1), error_text(result.estimates[index.name])
-        if case.uncertain and index.name in UNCERTAIN:
-            spread = spreads.get(index.name)
-            yield Column(f"{LEVEL:.0%} of {index.symbol}", 1), interval(spread.low, spread.high) if spread else ""
+    texts = {each: "" if each in lost else summary_number_text(each, result, DIGITS) for each in told}
+    for quantity in [each for each in told if each in MAIN]:
+        yield Column(quantity.symbol), texts[quantity]
+        is_second = quantity == STABILITY_INDEX
+        yield Column(f"± {quantity.symbol}", 3 if is_second else 1), error_text(result.estimates[quantity.name])
+        if case.uncertain and quantity.name in UNCERTAIN:
+            spread = spreads.get(quantity.name)
+            yield Column(f"{LEVEL:.0%} of {quantity.symbol}", 1), interval(spread.low, spread.high) if spread else ""
         if not over_p:
-            value = index.theory(result.curve.problem) if result.curve.is_possible else math.nan
-            heading = f"Eq. {index.closed_form}{'*' if case.theory_reduces_noise else ''}"
+            value = quantity.theory(result.parameter_set.problem) if result.parameter_set.is_possible else math.nan
+            heading = f"Eq. {quantity.closed_form}{'*' if case.theory_reduces_noise else ''}"
             yield Column(heading, 2), "" if math.isnan(value) else f"{value:.6g}"
     for p in _told_moments(case):
         estimate, symbol = result.moment(p), moment_at(p).symbol
         yield Column(symbol, (1 + (p != 2)) * bool(told)), short(estimate) if estimate else ""
         yield Column(f"± {symbol}", 3), error_text(estimate)
-    for rank, index in enumerate([each for each in told if each not in MAIN and over_p], 4):
-        yield Column(index.symbol, rank), texts[index]
+    for rank, quantity in enumerate([each for each in told if each not in MAIN and over_p], 4):
+        yield Column(quantity.symbol, rank), texts[quantity]
     if EXCURSIONS in case.asked:
         level = min(case.excursions.levels, key=lambda each: abs(math.log(each / 10)))
         bounds = bounds_text(result.excursion, level) if result.excursion else ""
