@@ -301,7 +301,7 @@ class Code(Enum):
         "variance is {reduced:.4g}, and Eq. (10) gives {variance:.4g} for the noise itself"
     )
     IMPOSSIBLE_BOUNCE = (
-        "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much; R = {factor:.3g} follows "
+        "note: 1 - epsilon^2 (1 - r) = {left:.3g} <= 0: no bounce of Eq. (3) loses so much. R = {factor:.3g} follows "
         "from the delta law only"
     )
     STRONG_NOISE = (

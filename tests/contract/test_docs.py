@@ -30,7 +30,7 @@ from fpsolve.analysis import Axis
 from fpsolve.model import OrnsteinUhlenbeckByDeviation, ParametricOscillator
 from tests.contract.test_cases import CASES, ROOT
 from tests.kit import case_in, rates, solve_case
-from tests.prose import CODE, PAGES, hard, texts
+from tests.prose import CODE, PAGES, PRINTED, hard, texts
 
 LONG = "guide/response", "guide/charts", "guide/python"
 
@@ -147,7 +147,7 @@ def test_noise_and_system_of_the_page_on_extending_are_what_those_that_ship_are(
     explore(own).close()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=str)  # then [*PAGES, *PRINTED]
+@pytest.mark.parametrize("page", [*PAGES, *PRINTED], ids=str)
 def test_no_sentence_is_hard(page):
     assert hard(page) == []
 
