@@ -119,8 +119,8 @@ class Code(Enum):
         "other value the blocks drive each other; choose a value close by"
     )
     START_MATTERS = (
-        "note: Λ(p) for p < -1 depends on the start: the noise never moves the phase into a certain set around the "
-        "slower mode. Λ(p) holds for starts in this set, and is smaller for other starts"
+        "note: Λ(p) for p < -1, and δ_p < -1, hold for starts near the slower mode: the noise never moves the phase "
+        "there. For other starts, such as all variables > 0, both are lower"
     )
     INVARIANT_CLASSES = (
         "note: the phase never leaves the ray at phi = {phase:.6g}: λ is {along:.6g} on the ray and {across:.6g} "

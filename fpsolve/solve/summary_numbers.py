@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from fpsolve.case.case import Case, ParameterSet
 from fpsolve.errors import NoSuchExponent
 from fpsolve.exponent.error import Estimate
@@ -31,6 +33,9 @@ def question_of(summary_number: SummaryNumber) -> Question:
         return Reason("absent", found.reason, summary_number.symbol)
 
     def said(found: Estimate, parameter_set: ParameterSet, numerics: Numerics) -> Iterator[Message]:
+        if summary_number.name == STABILITY_INDEX.name:
+            at, method = np.array([found.value]), numerics.solver(parameter_set.problem).method
+            yield from method.bounds(at, 0 * at, 0 * at)  # of Λ(δ_p) = 0
         if found.relative_error > numerics.rtol:
             yield Message(
                 Code.NUMBER_RTOL_MISSED,
