@@ -37,7 +37,7 @@ class Status(IntEnum):
     FAILED = 2
     MISSING = 3
     BEYOND_RTOL = 4
-    NO_SUMMARY_NUMBER = 5
+    NO_STABILITY_INDEX = 5
 
     @property
     def word(self) -> str:
@@ -218,7 +218,7 @@ class SetResult(Result):
         codes = {message_of(each).code for each in self.warnings}
         if not codes.isdisjoint((Code.RTOL_MISSED, Code.NUMBER_RTOL_MISSED)):
             return Status.BEYOND_RTOL
-        return Status.NO_SUMMARY_NUMBER if Code.NUMBER_MISSING in codes else Status.CONVERGED
+        return Status.NO_STABILITY_INDEX if Code.NUMBER_MISSING in codes else Status.CONVERGED
 
     @property
     def remarks(self) -> dict[Severity, Sequence[str]]:

@@ -374,7 +374,7 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
                 "noise.D0=0.1",
                 "output={quantities=['stability_index', 'lyapunov_exponent']}",
             ],
-            "no summary number",
+            "no stability index",
             "fpsolve found no stability index: Λ(p) has no root p ≠ 0 in [-20, 20]",
             "stability_index",
         ),
@@ -424,8 +424,8 @@ def test_what_fails_is_missing_in_every_file_and_said(tmp_path):
 def test_a_number_that_is_not_there_is_null_with_a_status_and_a_warning(tmp_path, sets, status, warning, missing):
     done = run(tmp_path, "run", "case.toml", "--set", "vary={}", *(f"--set={each}" for each in sets), case=TEXT)
     [parameter_set] = read_json(tmp_path / "results/case/summary.json")["sets"]
-    assert (done.code, parameter_set["status"]) == (0 if status == "no summary number" else 3, status)
-    assert ("none found" in done.out) == (status == "no summary number")
+    assert (done.code, parameter_set["status"]) == (0 if status == "no stability index" else 3, status)
+    assert ("none found" in done.out) == (status == "no stability index")
     assert sum(text.startswith(warning) for text in parameter_set["warnings"]) == 1
     [row] = read_csv(tmp_path / "results/case/sets.csv")
     assert row["status"] == status
