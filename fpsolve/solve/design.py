@@ -47,7 +47,7 @@ class DesignOutcome:
         least = max(10 * self.found.found.error_estimate, case.rtol * scale)
         return {
             "quantity": self.target.kind, **order, "value": self.target.value, "atol": float(f"{least:.1g}"),
-            "source": "the design that this case is",
+            "source": "fpsolve design",
         }  # fmt: skip
 
 
