@@ -82,7 +82,7 @@ def sentences(outcome: NoiseOutcome) -> Iterator[str]:
     """What the fit means: critical damping ratios, and λ and Λ(2) of the system with their probabilities."""
     if outcome.exponent and outcome.moment:
         exponent, moment = _percent(outcome.exponent), _percent(outcome.moment)
-        yield f"In weak noise without walls λ < 0 above {exponent} of critical damping, and Λ(2) < 0 above {moment}."
+        yield f"Damping needed in weak noise without walls, for λ < 0: {exponent} of critical, for Λ(2) < 0: {moment}."
     if outcome.system is None:
         one = "an oscillator state its damping by --damping-ratio."
         two = "two modes state their case by --case; `fpsolve new coupled` copies one."

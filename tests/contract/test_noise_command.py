@@ -130,7 +130,7 @@ def test_noise_times_2_in_the_equation_of_a_case_has_no_line_of_weak_noise(tmp_p
     assert found["critical_damping_ratio"] == {"lyapunov_exponent": None, "moment": None}
     expected = weak_moment(2, OMEGA, 0.25 / OMEGA, 4 * AT_DOUBLE, 0, "stiffness")
     assert known(found, "second_moment")[0] == pytest.approx(expected, rel=0.02)
-    assert "In weak noise" not in printed
+    assert "Damping needed" not in printed
 
 
 PARAMETRIC = f"""
@@ -188,7 +188,7 @@ def test_page_is_what_was_measured_the_verdict_and_the_section_on_one_screen(tmp
     ended = run(tmp_path, "noise", *options.split(), to=Terminal, **{"m.csv": EXACT})
     printed, order = (
         re.sub(r"\x1b\[[0-9;]*m", "", ended.out),
-        ["2f", "In weak noise", "λ = ", "Λ(2) = ", "[noise]", "written"],
+        ["2f", "Damping needed", "λ = ", "Λ(2) = ", "[noise]", "written"],
     )
     assert sorted(order, key=printed.index) == order
     assert printed.count("\n") <= 24
@@ -310,7 +310,7 @@ def test_named_density_of_waves_has_no_errors(tmp_path):
     assert found["frequencies"][0]["measured_density"]["standard_error"] is None
     assert found["read"] == "gamma = 3.3, Hs = 2, Tp = 9"
     assert printed.startswith(f"jonswap: {found['read']} Density")
-    assert f"Λ(2) < 0 above {100 * least:.4g} %." in printed
+    assert f"for Λ(2) < 0: {100 * least:.4g} %." in printed
     assert not any(each in printed + warned for each in ("probabilit", "measured", "±"))
 
 
