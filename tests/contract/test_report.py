@@ -139,7 +139,7 @@ def test_of_many_expected_values_those_that_differ_are_shown(tmp_path):
     asked = ["check", "case.toml", "--jobs", "1", "--set=vary.noise.D0={start=0.1, stop=1.0, num=60}"]
     differs = run(tmp_path, *asked, case=TEXT + expect.replace("VALUE", "1.0")).out
     assert differs.count("differs") == 50
-    assert "10 more differ\n0 of 60 ok" in differs
+    assert "10 more values differ\n0 of 60 ok" in differs
     assert run(tmp_path, *asked, case=TEXT + expect.replace("VALUE", "0.0")).out == "case: 60 of 60 ok\n"
 
 

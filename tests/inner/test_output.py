@@ -75,7 +75,7 @@ FIGURES = [
         ["finite elements"],
     ),
     ([many(8), "figure.mark=['stability_index', 'lyapunov_exponent']"], P, [], [INDEX, "slope $\\lambda$ at $p = 0$"]),
-    ([many(9)], P, [D0], ["finite elements", "perturbation, Eq. (37), of 3 curves", INDEX]),
+    ([many(9)], P, [D0], ["finite elements", "perturbation, Eq. (37), of 3 parameter sets", INDEX]),
     ([many(2), f"title='{'A title of many words ' * 12}'"], P, [], ["finite elements", INDEX]),
     (
         [many(9), "figure={x='noise.D0', y={moment=2.0}, xlabel='size $D$', lines=false}"],
