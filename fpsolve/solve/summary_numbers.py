@@ -33,7 +33,7 @@ def question_of(summary_number: SummaryNumber) -> Question:
         return Reason("absent", found.reason, summary_number.symbol)
 
     def said(found: Estimate, parameter_set: ParameterSet, numerics: Numerics) -> Iterator[Message]:
-        if summary_number.name == STABILITY_INDEX.name:
+        if summary_number.name == STABILITY_INDEX.name and found.value < -1:  # where a start may matter
             at, method = np.array([found.value]), numerics.solver(parameter_set.problem).method
             yield from method.bounds(at, 0 * at, 0 * at)  # of Λ(δ_p) = 0
         if found.relative_error > numerics.rtol:

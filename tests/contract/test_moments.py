@@ -155,6 +155,24 @@ def test_moments_below_minus_one_of_a_saddle_say_that_the_start_matters():
         assert ExponentSolver(matrices(SADDLE, TURN, turned), rtol=1e-2).moments([-1.5]).notes == ()
 
 
+GROWTH = """
+title = "Juveniles and adults, both > 0"
+system.variables = ["J", "A"]
+system.drift = ["b*(1 + xi)*A - 0.5*J", "0.2*J - 0.25*A"]
+system.parameters.b = 0.6
+noise = { kind = "telegraph", a = 0.5, k = 0.4 }
+output = { quantities = ["stability_index"], figure = false }
+vary."system.b" = [0.6, 0.8]
+"""
+
+
+def test_stability_index_below_minus_one_says_that_the_start_matters(tmp_path):
+    """It is 1.35 at b = 0.6, and -1.03 at b = 0.8."""
+    ended = run(tmp_path, "run", "case.toml", "--jobs", "1", case=GROWTH)
+    assert re.search(r"note: case, system.b = 0.8: Λ\(p\) for p < -1, and δ_p < -1, hold for starts", ended.err)
+    assert ended.err.count("hold for starts") == 1
+
+
 def test_even_moments_of_many_variables_bound_the_others():
     found = moment_lyapunov(masses(3, White(s=0.2)), 2.0)
     [note] = found.notes
