@@ -181,7 +181,11 @@ def read_text(path: Path, words: Words, *, may_be_latin: bool = False, most: int
     Raises:
         Unreadable: it is none.
     """
-    content = read_bytes(path, words, most)
+    return text_of(read_bytes(path, words, most), words, may_be_latin=may_be_latin)
+
+
+def text_of(content: bytes, words: Words, *, may_be_latin: bool = False) -> str:
+    """The text of what a file holds, see `read_text`. Raises Unreadable."""
     if content.startswith(BOM_UTF8) and not words.may_have_mark:
         raise Unreadable('starts with a byte order mark; save it as "UTF-8", not "UTF-8 with BOM"', 1)
     content = content.removeprefix(BOM_UTF8)

@@ -154,11 +154,7 @@ def measurement_of(
     for options, is_wrong, told in (
         (["named"], has_file, "is in place of a file, and one was named"),
         (["parameters"], not stated.named, "are those of --named"),
-        (
-            [*OF_SPECTRA, *OF_RECORDS, *OF_FILES, "column", "unit"],
-            not has_file,
-            "is for a file, and a density was named",
-        ),
+        ([*OF_SPECTRA, *OF_RECORDS, *OF_FILES], not has_file, "is for a file, and a density was named"),
         (OF_SPECTRA, not spectrum, "is for a spectrum, and a record was named"),
         (OF_RECORDS, spectrum, "is for a record, and a spectrum was named"),
         (["gm"], of != "height", "belongs to --of height"),

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from fpsolve.errors import FpsolveError
-from fpsolve.files import Unreadable, read_bytes, read_text
+from fpsolve.files import Unreadable, read_bytes, text_of
 from fpsolve.measured.table import WORDS, Part, Table, table_of
 from fpsolve.measured.text import parse
 
@@ -41,29 +40,21 @@ def read_table(path: Path, *, skip: int = 0, names: str = "", by_rows: bool = Fa
         skip, names, by_rows: as for `parse`; of arrays `skip` counts rows.
 
     Raises:
-        FpsolveError: it cannot be read: one sentence.
+        Unreadable: it cannot be read.
     """
     kind = path.suffix.lower()
-    try:
-        content = read_bytes(path, WORDS, MOST_BYTES if kind in KINDS else MOST_TEXT)
-        if content.startswith(MARKS) or (kind not in (*TEXTS, *KINDS) and b"\0" in content):
-            kind = SEISMIC
-        found = (
-            _in_a_process(path, kind) if kind in KINDS else read_text(path, WORDS, may_be_latin=True, most=MOST_TEXT)
-        )
-        if isinstance(found, str):
-            return parse(found, skip=skip, names=names, by_rows=by_rows)
-        if names or by_rows:
-            raise Unreadable("is no text, of which --names and --by rows tell; leave them out")
-        columns = {name: each[skip:] for name, each in found.columns.items() if each.size > skip}
-        if not columns:
-            raise Unreadable(
-                "has no columns of real numbers; export such vectors, each with a name, or skip fewer rows"
-            )
-        return replace(found, columns=columns)
-    except Unreadable as error:
-        place = path if error.line is None else f"{path}:{error.line}"
-        raise FpsolveError(f"{place}: {' '.join(error.sentence.split())}") from None
+    content = read_bytes(path, WORDS, MOST_BYTES if kind in KINDS else MOST_TEXT)
+    if content.startswith(MARKS) or (kind not in (*TEXTS, *KINDS) and b"\0" in content):
+        kind = SEISMIC
+    found = _in_a_process(path, kind) if kind in KINDS else text_of(content, WORDS, may_be_latin=True)
+    if isinstance(found, str):
+        return parse(found, skip=skip, names=names, by_rows=by_rows)
+    if names or by_rows:
+        raise Unreadable("is no text, of which --names and --by rows tell; leave them out")
+    columns = {name: each[skip:] for name, each in found.columns.items() if each.size > skip}
+    if not columns:
+        raise Unreadable("has no columns of real numbers; export such vectors, each with a name, or skip fewer rows")
+    return replace(found, columns=columns)
 
 
 def _in_a_process(path: Path, kind: str) -> Table | str:

@@ -69,12 +69,9 @@ def header(above: Sequence[str], count: int, separator: str) -> tuple[list[str],
     Campbell have a line below with what was done.
     """
     lines = [without_mark(each)[1] for each in above]
-    is_of_campbell = bool(lines) and lines[0].startswith('"TOA5"')
-    rows = [
-        row
-        for row in (_row(each, count, separator) for each in reversed(lines[: 3 if is_of_campbell else None]))
-        if row
-    ]
+    if is_of_campbell := bool(lines) and lines[0].startswith('"TOA5"'):
+        del lines[3:]
+    rows = [row for line in reversed(lines) if (row := _row(line, count, separator))]
     if not rows or (count == 1 and len(lines) > 1):  # any line may be that of one column
         return [], [""] * count
     below = [_BRACKETS.sub(r"\1", each) for each in rows[0]]

@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fpsolve.errors import FpsolveError
+from fpsolve.files import Unreadable
 from fpsolve.measured.files import read_table
 from fpsolve.measured.signals import SIGNALS, density_of_unit, density_such_as, factor_of, has_dimension
 from fpsolve.measured.spectrum import Record, Spectrum
@@ -148,11 +149,15 @@ def read_record(
 @contextmanager
 def _of_file(path: str | Path, **how: Any) -> Iterator[Table]:
     """The table of a file; what is wrong with it is said of the file."""
-    table = read_table(Path(path), **how)
+    line = ""
     try:
-        yield table
+        yield read_table(Path(path), **how)
+        return
+    except Unreadable as error:
+        line, told = "" if error.line is None else f":{error.line}", error.sentence
     except ValueError as error:
-        raise FpsolveError(f"{path}: {' '.join(str(error).split())}") from None
+        told = str(error)
+    raise FpsolveError(f"{path}{line}: {' '.join(told.split())}")
 
 
 def _has(table: Table) -> str:
