@@ -1,30 +1,32 @@
 """Λ(p) on an interval from solves at few p, by a polynomial of Λ(p)/p.
 
-In weak noise that is a polynomial to rounding at nine points of Chebyshev, with both ends. At p = 0 it is λ, and its
-tolerance does not fall there. Every second point is one of the polynomial before. Where coefficients fall slowly, as
-n⁻² at a corner, which a convex Λ does not hide between two points, n times the last ones are left; where they fall
-fast, the square of what the polynomial before is off at the other points, over the values. In strong noise Λ has
-branch points beside the real axis, and there is none: the interval is halved.
+It has the values and the slopes at points of Chebyshev with both ends. In weak noise Λ(p)/p is a
+polynomial to 1e-11 of four. At p = 0 it is λ, and its tolerance does not fall there. The last coefficients tell what is
+left, also where they fall as n⁻², as at a corner, which a convex Λ does not hide between two points. In strong noise Λ
+has branch points beside the real axis, and there is none: the interval is halved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.polynomial.chebyshev import chebvander
+from numpy.polynomial.chebyshev import chebder, chebvander
 
 from fpsolve.arrays import FloatArray
 
-NEXT_TO_ZERO = 1e-3
-"""Share of the interval; a point within it that is nearer to 0 is put there."""
-COUNTS = 5, 9, 17, 33
+COUNTS = 4, 7, 13
 """Numbers of points of a polynomial, each tried where the one before is not enough."""
-Solve = Callable[[float], tuple[float, float]]
-"""Λ(p)/p at one p, at p = 0 λ, and the estimate of its error."""
+MISSED = 60.0
+"""Largest error over the last quarter of the coefficients, of random functions with a corner, or with a branch point or
+a pole beside the interval."""
+BESIDE_ZERO = 0.25
+"""Least |p| of a point over the least distance of two: λ, and the slope of Λ(p)/p at p = 0, take more solves."""
+Solve = Callable[[float], tuple[float, float, float]]
+"""Λ(p)/p at one p, at p = 0 λ, its slope, and the estimate of its error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,26 +36,33 @@ class Curve:
     Attributes:
         nodes: the p that were solved, increasing, with both ends.
         ratio: the polynomial.
+        by_data: its coefficients by the values and slopes at the nodes, shape (2n, 2n).
         errors: of Λ(p)/p at these.
         left: what it is off between them.
     """
 
     nodes: FloatArray
     ratio: Chebyshev
+    by_data: FloatArray
     errors: FloatArray
     left: float
 
+    @property
+    def steepness(self) -> float:
+        """Markov's bound on the slope of a polynomial over its size, of the degree that so many values tell."""
+        return 2 * (COUNTS[0] - 1) ** 2 / float(np.ptp(self.nodes))
+
     def ratio_error(self, p: FloatArray) -> FloatArray:
-        """What is left, and the errors at all nodes as much as they may grow between these."""
-        to_unit, degree = 2 / np.ptp(self.nodes), self.nodes.size - 1
-        own, table = (chebvander(to_unit * (x - self.nodes[0]) - 1, degree) for x in (self.nodes, p))
-        return self.left + np.abs(table @ np.linalg.inv(own)) @ self.errors
+        """What is left, and the errors at the nodes, of values and slopes, as much as they may grow between these."""
+        both = np.concatenate([self.errors, self.steepness * self.errors])
+        off, scale = self.ratio.mapparms()
+        at_p = chebvander(off + scale * p, both.size - 1)
+        return self.left + np.abs(at_p @ self.by_data) @ both
 
     def values(self, p: FloatArray) -> Values:
         """Λ and its derivatives; the error of Λ′ is that of Markov's bound on the slope of a polynomial."""
         value, slope, second = (self.ratio.deriv(k)(p) for k in range(3))
-        steepness = 2 * (self.nodes.size - 1) ** 2 / np.ptp(self.nodes)
-        of_slope = np.max(self.ratio_error(self.nodes)) * (1 + steepness * np.abs(p))
+        of_slope = np.max(self.ratio_error(self.nodes)) * (1 + self.steepness * np.abs(p))
         return Values(p * value, p * slope + value, p * second + 2 * slope, self.ratio_error(p) * np.abs(p), of_slope)
 
 
@@ -94,28 +103,28 @@ def polynomials(
 
 def polynomial(solve: Solve, low: float, high: float, allowed: Callable[[float], float]) -> Curve | None:
     """Λ by a polynomial, if at all points the error of Λ(p)/p is allowed, or twice that of the point at most."""
-    half, last = 0.5 * (high - low), None
+    half = 0.5 * (high - low)
     for count in COUNTS:
         points = low + half - half * np.cos(np.pi * np.arange(count) / (count - 1))
         points[[0, -1]] = low, high
-        inner = points[1:-1]
-        inner[np.abs(inner) < 2 * half * NEXT_TO_ZERO] = 0.0
-        places = points.tolist()
-        known = {p: solve(p) for p in sorted(places, key=abs, reverse=True)}
-        ratios, errors = np.array([known[p] for p in places]).T
-        ratio = Chebyshev.fit(points, ratios, count - 1, domain=(low, high))
-        most = np.maximum([allowed(p) for p in places], 2 * errors)
+        room, inner = BESIDE_ZERO * np.min(np.diff(points)), points[1:-1]
+        inner[:] = np.where(np.abs(inner) < room, np.copysign(room, inner), inner)
+        solved = {p: solve(p) for p in sorted(points.tolist(), key=abs)}
+        ratios, slopes, errors = np.array([solved[p] for p in points.tolist()]).T
+        by_data: Any = np.linalg.inv(_conditions(points))
+        coefficients = by_data @ np.concatenate([ratios, slopes])
+        most = np.maximum([allowed(p) for p in points.tolist()], 2 * errors)
+        left = MISSED * float(np.sum(np.abs(coefficients[-(count // 2) :])))
+        if np.all(errors + left <= most):
+            return Curve(points, Chebyshev(coefficients, domain=(low, high)), by_data, errors, left)
         size = np.max(np.abs([ratios, most]))
-        left = abs(ratio.coef[-1])
-        if last is not None:
-            off = np.max(np.abs(last(points) - ratios))
-            left = count * np.sum(np.abs(ratio.coef[-3:])) + off**2 / size
-            curve = Curve(points, ratio, errors, left)
-            if np.all(curve.ratio_error(points) <= most):
-                return curve
-        if size * (left / size) ** ((COUNTS[-1] - 1) // (count - 1)) > np.min(
-            most
-        ):  # what the most points leave, about
+        if size * (left / size) ** (COUNTS[-1] // count) > np.min(most):  # about what the most points leave
             return None
-        last = ratio
     return None
+
+
+def _conditions(nodes: FloatArray) -> FloatArray:
+    """Values and slopes at the nodes of all Chebyshev polynomials with two for each, shape (2n, 2n)."""
+    count, to_unit = 2 * nodes.size, 2 / np.ptp(nodes)
+    values = chebvander(to_unit * (nodes - nodes[0]) - 1, count - 1)
+    return np.concatenate([values, to_unit * values[:, :-1] @ chebder(np.eye(count))])

@@ -51,6 +51,8 @@ MOSTLY = 0.5
 DOUBT = 1e-3
 """Share of its terms by which a tangent of Λ may lie too high: the errors of its p."""
 _EPS = float(np.finfo(float).eps)
+THROUGH = 3
+"""Number of p through which T and T* are extrapolated."""
 REFINEMENTS = 16
 """Number of times that T′ is improved by its residual, at most."""
 REFINED = 1e-14
@@ -129,8 +131,8 @@ def principal_pair(
     Args:
         generator: the discrete tilted generator.
         p: the moment.
-        start: the pair of a neighbouring p or of another generator, or several pairs, whose tangents bound Λ(p); it
-            saves time.
+        start: the pair of a neighbouring p or of another generator, or several pairs, the nearest p first, whose
+            tangents bound Λ(p); it saves time.
 
     Raises:
         NumericalFailure: the numbers of L(p) are too large to be squared.
@@ -144,21 +146,29 @@ def principal_pair(
     if pairs or p == 0 or not _has_other_positive(generator, p):
         x = y = pencil.space.constant  # of weak noise, Eqs. (26) and (28)
         if pairs:
-            nearest = min(pairs, key=lambda each: abs(each.p - p))
-            x, y = nearest.right, nearest.left
-            if nearest.generator is not generator:  # whose functions move with p
-                x, y = pencil.space.carry(np.array([x, y]), nearest.space)
+            x, y = _predicted(pencil, generator, pairs)
         pair = _reached(generator, pencil, x, y)
         if _is_principal(pair, pairs, continues=bool(pairs) and _share(pencil.space, pair, x, y) > MOSTLY):
             return pair
     return _rightmost_pair(pencil, generator, pair)
 
 
+def _predicted(pencil: Pencil, generator: Generator, pairs: Sequence[PrincipalPair]) -> FloatArray:
+    """T and T* by the polynomial in p through those of the nearest p in one space, shape (2, size)."""
+    p, last = pencil.p, pairs[0].generator
+    near = [each for each in pairs if each.generator is last][:THROUGH]
+    both = np.zeros((2, last.size))
+    for each in near:
+        share = math.prod((p - other.p) / (each.p - other.p) for other in near if other is not each)
+        both += share * np.array([each.right, each.left])
+    return both if last is generator else pencil.space.carry(both, last.space(p))
+
+
 def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], continues: bool) -> bool:
     """Whether a pair that was reached from others, or from T = 1, is the principal one.
 
-    Where other pairs may seem positive, too, it must go on from the others, or reach the tangent of Λ at their p. At
-    p = 0 it has Λ = 0 and T = 1.
+    It must reach the tangent of Λ at their p and, where other pairs may seem positive, too, go on from them. At p = 0
+    it has Λ = 0 and T = 1.
     """
     generator, tangent = pair.generator, _tangent(pair, pairs)
     most = POSITIVE if continues else SURELY_POSITIVE
@@ -166,7 +176,7 @@ def _is_principal(pair: PrincipalPair, pairs: Sequence[PrincipalPair], continues
         return False
     if pair.p == 0:
         return abs(pair.value) <= BESIDE_IT[0] * generator.framed.unit_rate
-    if not continues and math.isinf(tangent) and _has_other_positive(generator, pair.p):
+    if not continues and _has_other_positive(generator, pair.p):
         return False
     return not generator.left_in_phase or _is_rightmost(pair)
 

@@ -43,17 +43,19 @@ from fpsolve.exponent.method import (
     Tolerance,
 )
 from fpsolve.exponent.moments import EvenMoment, even_moment
-from fpsolve.exponent.starts import Start, first, has_cones, other_centers
+from fpsolve.exponent.starts import Start, first, has_cones, other_centers, turns_back
 from fpsolve.fem.axis import FEW_UNKNOWNS
 from fpsolve.fem.generator import Generator
 from fpsolve.fem.noise_axes import CellAxis
 from fpsolve.fem.space import Space
 from fpsolve.messages import Code, Message, Remedy
 from fpsolve.model.coordinates import infinite
-from fpsolve.theory.frozen import frozen_noise
+from fpsolve.theory.frozen import eigenvalues_at, frozen_noise
 
 MOST_TILT_AWAY = 0.7
 """How far the tilt of a space may be from the best one at another p."""
+MOST_ACROSS_ZERO = 0.5
+"""How far apart two p of other signs may be for a large space to serve both."""
 SLOWEST = 0.9
 """The largest ratio of two changes in turn that is reckoned with."""
 WIDER = 4.0
@@ -64,8 +66,6 @@ AT_CORNER = 1e-3
 """Distance from p = −1, where Λ(p) of a saddle with two variables has a corner, or nearly one: two eigenvalues meet."""
 MIXED = 100.0
 """‖T′‖ over ‖T‖ from which on T is thought to be a mixture of those of two eigenvalues that meet."""
-MOST_HALVED = 20_000
-"""Unknowns of a system on halved cells that is solved for that: beyond, cells are many, and it takes long."""
 MOST_EQUATIONS = 8000
 """Of even moments."""
 SURELY = 10.0
@@ -91,6 +91,7 @@ class Elements(Method):
         self.spaces: dict[float, Solution] = {}
         self._accepted = dict[float, float]()  # the largest error that was allowed
         self._failed = dict[float, tuple[type[NotConverged], Message]]()
+        self._finer = dict[Space, Generator]()
 
     def _near(self, p: float) -> list[PrincipalPair]:
         """The pairs at other p, the nearest first."""
@@ -170,7 +171,7 @@ class Elements(Method):
 
         Each axis is finer; for algebraic tails its interval is wider, too. Raises as `pair_among`.
         """
-        return self.pair_among(widened(pair.generator).enriched(), pair)
+        return self.pair_among(widened(pair.generator).finer, pair)
 
     def pair_among(self, chosen: Space, pair: PrincipalPair) -> PrincipalPair:
         """That at the same p on other functions.
@@ -182,7 +183,8 @@ class Elements(Method):
             reason = Message(Code.UNKNOWNS_SPENT, unknowns=chosen.size, most=most)
             raise NotConverged(Message(Code.NOT_FINER, p=pair.p, reason=reason), remedy=self.remedy)
         with self.solving(pair.p):
-            return self.pair_on(Generator(self.problem, chosen), pair.p, pair)
+            generator = self._finer[chosen] = self._finer.get(chosen) or Generator(self.problem, chosen)
+            return self.pair_on(generator, pair.p, pair)
 
     def near_zero(self, p: float, tolerance: Tolerance | None) -> Solution:
         """The solution at ±`SMALL_P` that a smaller p goes with."""
@@ -276,13 +278,13 @@ class Elements(Method):
 
     def _lacked(self, pair: PrincipalPair) -> float:
         """Estimate of |error of Λ′| on the interval of a noise: twice what a finer discretisation changes."""
-        finer = self.pair_among(pair.generator.chosen.enriched(), pair)
+        finer = self.pair_among(pair.generator.chosen.finer, pair)
         return 2 * abs(finer.derivative - pair.derivative) + slope_rounding(pair)
 
     def slope_error(self, p: float) -> float:
         """1.5 times the larger of two changes by finer discretisations over 1 − r, r their ratio if they have one sign.
 
-        With one finer one alone r is taken as ¼.
+        With one finer one alone r is taken as ¼. Both may be small by chance, so that the error of Λ is added.
         """
         if abs(p) < TINIEST_P:
             return self.ratio_alone(0.0)[1]
@@ -294,7 +296,7 @@ class Elements(Method):
         with unless_over_budget():
             more = self.finer_pair(finer).derivative - finer.derivative
         ratio = np.clip(more / (change or sys.float_info.min), 0.0, SLOWEST)
-        return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + rest)
+        return float(1.5 * max(abs(change), abs(more)) / (1 - ratio) + solution.error + rest)
 
     def _jump(self) -> float:
         """What Λ′ rises at p = −1 if Λ″ on both sides does not explain it: there is any slope between at a corner."""
@@ -312,6 +314,10 @@ class PlaneElements(Elements):
     @property
     def usual_rtol(self) -> float:  # type: ignore[override]
         return RTOL_OF_SEVERAL if self.is_dear(1.0) else RTOL
+
+    @property
+    def turns_back(self) -> bool:  # type: ignore[override]
+        return self.is_quick and turns_back(self.problem)
 
     def is_dear(self, p: float) -> bool:
         return len(self.problem.valued.parts) > 1
@@ -334,25 +340,27 @@ class PlaneElements(Elements):
         )
 
     def places(self, p: float, tolerance: Tolerance, found: Sequence[Solution]) -> Iterator[tuple[Stage, Any]]:
-        """The first one is that of the nearest p, if its functions serve this one, too, else where slow noise carries
+        """The first one is that of the nearest p, if it is not far away, else where slow noise carries
         the moment, or the mean of other noise. Others are far from there.
         """
         near = self._near(p)
-        if near and self._serves(near[0], p):
-            yield Start(self.problem, near[0].generator.chosen), near
-        else:
-            yield Start(self.problem, first(self.problem, p, self.settings.rtol)), None
+        space = near and self._moved(near[0], p)
+        yield Start(self.problem, space or first(self.problem, p, self.settings.rtol)), near
         for center in other_centers(found[0].pair):
             yield Start(self.problem, first(self.problem, p, self.settings.rtol, center)), None
 
-    def _serves(self, near: PrincipalPair, p: float) -> bool:
-        """Whether the space of another p is of use: a large one far away is not, nor one with another tilt."""
+    def _moved(self, near: PrincipalPair, p: float) -> Space | None:
+        """The space of another p, with the tilt for this one if its own is far off; None where p is far away."""
         q, space, frozen = near.p, near.generator.chosen, frozen_noise(self.problem)
-        if space.size > FEW_UNKNOWNS and abs(p - q) > max(0.5, 0.4 * min(abs(p), abs(q))):
-            return False
+        if space.size > FEW_UNKNOWNS and p * q < 0 and abs(p - q) > MOST_ACROSS_ZERO:
+            return None
         if frozen is None or not self.problem.valued.may_tilt:
-            return True
-        return abs(frozen.tilt(frozen.center(p)) - space.xi.slope * p) <= MOST_TILT_AWAY
+            return space
+        tilt = frozen.tilt(frozen.center(p))
+        if abs(tilt - space.xi.slope * p) <= MOST_TILT_AWAY:
+            return space
+        is_near = abs(tilt - frozen.tilt(frozen.center(q))) <= MOST_TILT_AWAY
+        return space.with_axis(1, replace(space.xi, slope=tilt / p)) if is_near else None
 
     def confirmed(self, search: Search, found: Sequence[Solution]) -> Solution:
         """The largest one, if it agrees with that of halved cells of φ within its error, or within what is allowed.
@@ -361,17 +369,15 @@ class PlaneElements(Elements):
         none of its modes shows it. Where two eigenvalues meet, modes of a mixture of both T tell little.
         """
         best = super().confirmed(search, found)
-        chosen, p = best.pair.generator.chosen, search.p
-        if self.is_at_corner(p) and length(PairDerivatives(best.pair).by_p) > MIXED * length(best.pair.right):
+        chosen = best.pair.generator.chosen
+        if self.is_at_corner(search.p) and length(PairDerivatives(best.pair).by_p) > MIXED * length(best.pair.right):
             halves = chosen.doubled()
             with unless_over_budget():
                 pair = self.pair_among(halves, best.pair)
                 return replace(best, unresolved=2 * abs(pair.value - best.value))
             return self.confirmed(search, [search.settle(Start(self.problem, halves))])
-        if self.settings.rtol <= SURELY_SEEN:
-            return best
         halved = chosen.with_axis(0, chosen.phi.doubled())
-        if halved.size > min(MOST_HALVED, self.settings.budget.most(halved)):
+        if self.settings.rtol <= SURELY_SEEN or halved.size > self.settings.budget.most(halved):
             return best
         finer = search.settle(Start(self.problem, halved), best.pair)
         change = abs(finer.value - best.value)
@@ -382,7 +388,7 @@ class PlaneElements(Elements):
         return self.confirmed(search, [finer])
 
     def is_at_corner(self, p: float) -> bool:
-        return abs(p + 1) <= AT_CORNER
+        return abs(p + 1) <= AT_CORNER and not eigenvalues_at(self.problem, 0.0)[2]
 
     @property
     def has_witness(self) -> bool:  # type: ignore[override]
@@ -410,7 +416,7 @@ class GivenMesh(PlaneElements):
         """That of the mesh, and one that is finer twice, whose error hardly counts beside it. Raises `MeshError`."""
         assert self.settings.mesh is not None
         generator = Generator(self.problem, self.settings.mesh)
-        return generator, Generator(self.problem, generator.chosen.enriched().enriched())
+        return generator, Generator(self.problem, generator.chosen.finer.finer)
 
     def solution(self, p: float, tolerance: Tolerance | None = None) -> Solution:
         _ = self.generators  # refuses a mesh that cannot be used
@@ -433,7 +439,7 @@ class GivenMesh(PlaneElements):
         chosen = widened(pair.generator)
         if chosen.xi.lines.size:
             chosen = chosen.with_axis(1, chosen.xi.reaching(*are_cut(chosen.xi)))
-        return self.pair_among(chosen.enriched(), pair)
+        return self.pair_among(chosen.finer, pair)
 
     def _among_tails(self, pair: PrincipalPair) -> tuple[float, float]:
         """λ, on the interval of the mesh, and what a wider one would change."""

@@ -218,20 +218,18 @@ def mode_effects(pair: PrincipalPair) -> tuple[ModeEffects | None, ...]:
     norm = abs(pair.left @ space.weighed(pair.right))
     count, found = len(space.axes), list[ModeEffects | None]()
     for k, axis in enumerate(space.axes):
-        inside = axis.cells >= 0
-        if not np.any(inside):
+        kept, are_highest, degrees = axis.highest
+        if not degrees.size:
             found.append(None)
             continue
-        degrees = np.zeros(int(axis.cells.max()) + 1, dtype=int)
-        np.maximum.at(degrees, axis.cells[inside], axis.modes[inside])
-        masks = inside & (degrees[axis.cells] - axis.modes == np.arange(4)[:, None])  # from the highest mode on
         others = tuple({*range(1, count + 1)} - {k + 1})
         nested = count * [None]
         nested[k] = axis.nested
-        smooth, rough = along(nested, both)
-        parts = rough * np.cumsum(operator @ (smooth * np.expand_dims(masks, others)), axis=0)
-        shares = np.abs(parts).sum(axis=others) * np.cumsum(masks, axis=0)
-        effects = [np.bincount(axis.cells[inside], each[inside], degrees.size) / norm for each in shares]
+        smooth, rough = np.compress(kept, along(nested, both), axis=k + 1)
+        parts = rough * np.cumsum(operator.on(k, kept) @ (smooth * np.expand_dims(are_highest, others)), axis=0)
+        shares = np.abs(parts).sum(axis=others) * np.cumsum(are_highest, axis=0)
+        effects = np.zeros((4, degrees.size))
+        np.add.at(effects.T, axis.cells[kept], shares.T / norm)
         highest = np.maximum.accumulate(effects)  # in those of more modes, parts of these may cancel
         found.append(ModeEffects(degrees, highest, axis.slowest if k else pair.generator.left_in_phase))
     return tuple(found)

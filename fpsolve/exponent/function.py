@@ -20,7 +20,6 @@ from fpsolve.exponent.solver import (
     MomentLyapunov,
     broken_convexity,
     interpolated,
-    sign_change,
     solver_of,
 )
 from fpsolve.fem.mesh import CylinderMesh
@@ -30,8 +29,6 @@ from fpsolve.model.quantity import DERIVATIVE, MOMENT, SECOND_DERIVATIVE, P
 if TYPE_CHECKING:
     import xarray
 
-FEW = 17
-"""Number of p of the interval at which a sign of Λ(p)/p is looked for, besides the nodes."""
 SHOWN = 201
 """So many p of the interval are drawn."""
 MOST_PARTS = 40
@@ -112,19 +109,6 @@ class MomentLyapunovFunction(Result):
     def moments(self, p: ArrayLike) -> MomentLyapunov:
         """Λ(p) at several p; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
         return interpolated(self.solver, self._curves, checked_moments(p, self.solver.method))
-
-    def root(self) -> float | None:
-        """Where Λ(p)/p changes its sign in the interval, or None."""
-        p = np.union1d(self.nodes, np.linspace(*self.interval, FEW))
-        return sign_change(p, self(p))
-
-    def lyapunov_exponent(self) -> Estimate:
-        """λ = Λ′(0), Eq. (2), solved at p = 0. Raises `NotConverged`."""
-        return self.solver.lyapunov_exponent()
-
-    def variance_rate(self) -> Estimate:
-        """Λ″(0), solved at p = 0. Raises `NotConverged`."""
-        return self.solver.variance_rate()
 
     def stability_index(self, search: tuple[float, float] = SEARCH_INTERVAL) -> Estimate | Absent:
         """δ_p, see `nonzero_root`, or why there is none. Raises `NotConverged`."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fpsolve.arrays import FloatArray, real_numbers
-from fpsolve.budget import Meter, OverBudget, charge, unless_over_budget
+from fpsolve.budget import Meter, OverBudget, charge
 from fpsolve.errors import FpsolveError, MeshError, NoHierarchy, NoSuchExponent, NotConverged, SingularMatrix
 from fpsolve.exponent.changed import Changed
 from fpsolve.exponent.eigen import PairDerivatives, PrincipalPair
@@ -155,6 +155,7 @@ class Method:
         no_picture: why they cannot be drawn; empty where they can.
         adapts: whether a discretisation is chosen for each p.
         is_function: whether Λ may be interpolated over p.
+        turns_back: whether noise turns the phase back, so that Λ has branch points beside real p, and it is quick.
         is_quick: whether Λ(p) at many p takes less than a second.
         by_moments: whether Λ(p) of even p is that of the equations of the moments.
         ray: φ of a ray that the phase never leaves; None where there is none.
@@ -168,7 +169,7 @@ class Method:
     pictures = DIRECTIONS
     no_picture = ""
     adapts = True
-    is_function = False
+    is_function = turns_back = False
     is_quick = False
     by_moments = False
     ray: float | None = None
@@ -345,17 +346,14 @@ class Method:
     def variance_rate(self) -> Estimate:
         """Λ″(0), the asymptotic growth rate of the variance of ln ‖x‖.
 
-        Its error is what two finer discretisations change in it, as one change is small by chance; twice the first one
-        where the second has too many unknowns. Raises `NotConverged`, `NoSuchExponent`.
+        Its error is what a finer discretisation changes in it, and that of λ, as one change is small by chance. Raises
+        `NotConverged`.
         """
         refuse(self.reason(1.0, VARIANCE_RATE.symbol))
         scale = 2 * self.scales.quadratic
         value, better = self.around_zero.second_derivative, self.finer_around_zero.second_derivative
-        error = 2 * abs(better - value)
-        with unless_over_budget():
-            finest = PairDerivatives(self.finer_pair(self.finer_around_zero.pair)).second_derivative
-            error, better = abs(finest - better) + 0.5 * error, finest
-        error += 10 * sys.float_info.epsilon * max(scale, abs(better))
+        rounding = 10 * sys.float_info.epsilon * max(scale, abs(better))
+        error = abs(better - value) + rounding + (self.ratio_alone(0.0)[1] if scale else 0.0)
         return self.checked(Estimate(better, error, scale, quantity=VARIANCE_RATE))
 
     def gradient(self, p: float, keys: Sequence[str]) -> FloatArray:

@@ -182,7 +182,7 @@ class DirectionStart(Start):
             if effects is not None and error > share:
                 noises[k] = axis.enriched() if error < effects.error else axis.refined(effects, share)
         found = Space((phi, *noises))
-        return found if found.size > self.space.size else self.space.enriched()
+        return found if found.size > self.space.size else self.space.finer
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,8 +43,6 @@ from fpsolve.theory.frozen import eigenvalues_at
 if TYPE_CHECKING:
     import xarray
 
-NODES = 0.3
-"""Share of the tolerance of a curve for the errors of its nodes, which may grow between them."""
 FEW_MOMENTS = 16
 """Up to so many p are solved one by one."""
 SLOPE_SHARE = 1e-3
@@ -65,7 +63,6 @@ class MomentLyapunov(Result):
         residual: backward error of the eigenpairs, shape (n,); NaN where there is none.
         solver: what solved them.
         curves: of which these are values; none where each p was solved.
-        root: where Λ(p)/p changes its sign, near δ_p; None where that is not among the p, or Λ was not interpolated.
         failures: why some p are missing, or none is to be trusted.
     """
 
@@ -76,7 +73,6 @@ class MomentLyapunov(Result):
     residual: FloatArray
     solver: ExponentSolver
     curves: tuple[Curve, ...] = ()
-    root: float | None = None
     failures: tuple[Failure, ...] = ()
 
     def __post_init__(self) -> None:
@@ -251,7 +247,9 @@ class ExponentSolver:
         intervals = [(low, high)]
         if low < -1 < high and not eigenvalues_at(self.problem, 0.0)[2]:
             intervals, most = [(low, -1.0), (-1.0, high)], 2 * most
-        parts = polynomials(self._node, intervals, self._allowed, most) if self.method.is_function else []
+        parts = list[Curve]()
+        if self.method.is_function:
+            parts = polynomials(self.method.ratio, intervals, self._allowed, most)
         if not parts:
             raise NotConverged(Message(Code.NO_FUNCTION, low=low, high=high))
         return tuple(parts)
@@ -260,9 +258,6 @@ class ExponentSolver:
         """The largest error of Λ(p)/p, and of λ."""
         size = max(abs(p), SMALL_P)
         return self.method.tolerance(size, 0.0) / size
-
-    def _node(self, p: float) -> tuple[float, float]:
-        return self.method.ratio_alone(p, partial(share_of, NODES * self._allowed(p)))
 
     def moments(
         self,
@@ -288,8 +283,8 @@ class ExponentSolver:
             if not math.isnan(row.derivative_error):
                 self.slope_errors.setdefault(q, row.derivative_error)
         failures = {}
-        inwards = np.lexsort((-np.abs(points), points < 0))  # as a mesh for a large |p| serves smaller ones
-        for q in points[inwards].tolist():
+        outwards = np.lexsort((np.abs(points), points < 0))  # each from those before
+        for q in points[outwards].tolist():
             begin(f"Λ({q:g})")
             try:
                 if q not in rows:
@@ -307,7 +302,8 @@ class ExponentSolver:
         value, slope, _, errors, residuals = np.array([rows[q] for q in found.tolist()]).reshape(-1, 5).T
         if self.method.lacks_moments:
             slope = np.full_like(slope, math.nan)  # of p = 0, beside which there is no Λ(p)
-        return MomentLyapunov(found, value, slope, errors, residuals, self, failures=tuple(failures.values()))
+        failed = tuple(failures[q] for q in points.tolist() if q in failures)
+        return MomentLyapunov(found, value, slope, errors, residuals, self, failures=failed)
 
     def slope(self, p: float) -> float:
         """Λ′(p) by eigenfunctions; NaN where these are not found, or there are none."""
@@ -406,7 +402,7 @@ def solve_moments(
         NoSuchExponent: Λ(p) is infinite for one of the p.
     """
     asked = checked_moments(p, solver.method, may_be_empty=True)
-    if np.unique(asked).size > FEW_MOMENTS:
+    if np.unique(asked).size > FEW_MOMENTS and not solver.method.turns_back:
         try:
             with unless_over_budget():
                 result = interpolated(solver, solver.curves(float(asked.min()), float(asked.max()), 1), asked)
@@ -426,21 +422,15 @@ def solve_moments(
 def interpolated(solver: ExponentSolver, curves: tuple[Curve, ...], p: FloatArray) -> MomentLyapunov:
     """Λ at several p by curves; the residual is the largest of the nodes. Raises `NotConverged` if they contradict."""
     value, slope, _, error, _ = values(curves, p)
-    for i in np.flatnonzero(p):
-        solver.method.check(float(p[i]), float(value[i]), float(error[i]))
+    size = np.maximum(np.abs(value), solver.method.scales.moment(p))
+    i = int(np.argmax(error / (size + 1e-300)))
+    solver.method.check(float(p[i]), float(value[i]), float(error[i]))
     nodes = [p for curve in curves for p in curve.nodes.tolist()]
     residual = np.full(p.size, max(solver.method.solution(node).pair.residual for node in nodes))
-    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves, root=sign_change(p, value))
+    found = MomentLyapunov(p, value, slope, error, residual, solver, curves=curves)
     if obstacle := _obstacle(found):
         raise NotConverged(obstacle, remedy=solver.method.refinement)
     return found
-
-
-def sign_change(p: FloatArray, value: FloatArray) -> float | None:
-    """Where Λ(p)/p, which increases, changes its sign, on the line between its values; None where it does not."""
-    p, value = np.array(sorted(zip(p, value, strict=True))).T
-    ratio = value[p != 0] / p[p != 0]
-    return float(np.interp(0.0, ratio, p[p != 0])) if np.any(ratio <= 0) and np.any(ratio > 0) else None
 
 
 def _obstacle(result: MomentLyapunov) -> Message | None:
@@ -455,14 +445,13 @@ def broken_convexity(
 ) -> Message | None:
     """Where a point, or Λ(0) = 0, lies below a tangent by more than the errors explain; or None, as Λ(p) is convex.
 
-    Tangents are those of the 1st, 2nd, 4th, 8th … p on each side. The errors of the slopes are asked for where those of
-    the values do not suffice.
+    Tangents are those of the next p on each side. The errors of the slopes are asked for where those of the values do
+    not suffice.
     """
     if not p.size:
         return None
     order, value = np.argsort(p), np.where(p == 0, 0.0, value)  # but for rounding
-    sides = [(order[:-k], order[k:]) for k in 2 ** np.arange((p.size - 1).bit_length())]
-    own, other = np.concatenate([*sides, *(side[::-1] for side in sides), (order, np.full(p.size, p.size))], axis=1)
+    own, other = np.array([[*order[:-1], *order[1:], *order], [*order[1:], *order[:-1], *order.size * [p.size]]])
     p, value, errors = (np.append(each, 0.0) for each in (p, value, errors))
     away = p[other] - p[own]
     above = value[other] - (value[own] + slope[own] * away)

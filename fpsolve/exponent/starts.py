@@ -29,10 +29,8 @@ from fpsolve.theory.frozen import frozen_noise, steady_places, swing
 
 REACH = 12.0
 """Standard deviations on both sides, up to which the first cells of noise with algebraic tails are."""
-SHARE = 0.05
+SHARE = 0.1
 """Share of the tolerance that a new discretisation is made for in each direction, so that it serves other p too."""
-ALONE = 0.5
-"""Share of the tolerance in each direction of a discretisation that serves one p only."""
 ROUND = 360
 """Number of φ at which it is asked which way the phase turns."""
 COMPARABLE = 0.6
@@ -77,19 +75,13 @@ class Start(Stage):
         return replace(self, space=found) if found.size > self.space.size else None
 
     def refined(self, solution: Solution, goal: float, most: int) -> Start:
-        """More functions where those of a solution lack more than their share of an error, fewer where less.
-
-        Where these are more unknowns than most, they are those that do for this p alone.
-        """
-        for share in (SHARE * goal, ALONE * goal):
-            found = self.space.refined(solution.effects, share)
-            if found.xi.lines.size:
-                lower, upper = solution.truncation
-                found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
-            found = found if found.size > self.space.size else found.raised()
-            if found.size <= most:
-                break
-        return replace(self, space=found)
+        """More functions where those of a solution lack more than their share of an error, fewer where less."""
+        share = SHARE * goal
+        found = self.space.refined(solution.effects, share)
+        if found.xi.lines.size:
+            lower, upper = solution.truncation
+            found = found.with_axis(1, found.xi.reaching(lower > share, upper > share))
+        return replace(self, space=found if found.size > self.space.size else found.raised())
 
 
 def first(problem: Problem, p: float, rtol: float, center: float | None = None) -> Space:
@@ -102,6 +94,17 @@ def first(problem: Problem, p: float, rtol: float, center: float | None = None) 
         axes, xi = [first_axis(each, digits) for each in noise.parts.values()], problem.valued.extremes
     is_smooth = sum(axis.dimension for axis in axes) > 1
     return Space((_phase(framed(problem).motion, xi, digits, is_smooth), *axes))
+
+
+def turns_back(problem: Problem) -> bool:
+    """Whether noise turns the phase back."""
+    return _swing(framed(problem).motion, problem.valued.extremes) > 1
+
+
+def _swing(system: LinearMotion, xi: Xi) -> float:
+    """The largest change of the phase speed over its mean, for some ξ."""
+    speed = system.phase_speed(xi)
+    return float(np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300)))
 
 
 def _of_tails(problem: Problem, p: float, digits: float, center: float | None) -> tuple[NoiseAxis, Xi]:
@@ -142,8 +145,7 @@ def _phase(system: LinearMotion, xi: Xi, digits: float, is_smooth: bool) -> Phas
     There are more where the speed of the phase changes much for some of the ξ; but one, of a higher degree, where
     several numbers move it, which leave T smoother, and each function of φ is a thousand unknowns.
     """
-    speed = system.phase_speed(xi)
-    widest = np.max(speed.amplitude / np.maximum(np.abs(speed.mean), 1e-300))
+    widest = _swing(system, xi)
     cells = 1 if is_smooth else 8 if widest > 1 else 4 if widest > 0.5 else 2
     rays = [jump.phase for jump in system.jumps] or [math.pi / 2]
     lines = rays[0] + np.linspace(0, math.pi, cells + 1)

@@ -99,7 +99,7 @@ def split(lines: FloatArray, effects: ModeEffects, share: float) -> tuple[FloatA
     in_half = needed * rate / (rate + HALVING)
     is_split = (2 * in_half + 2 < needed + 1) & (effects.degrees >= SPLIT_DEGREE) & (needed > effects.degrees)
     is_split |= needed > MOST_DEGREE
-    degrees = np.ceil(np.where(is_split, in_half, needed) + 0.2)
+    degrees = np.ceil(np.where(is_split, in_half, needed))
     degrees = np.clip(degrees, np.maximum(LEAST_DEGREE, effects.degrees - 4), effects.degrees + 4)
     degrees = np.repeat(np.minimum(degrees, MOST_DEGREE).astype(int), np.where(is_split, 2, 1))
     return np.sort(np.concatenate([lines, middles(lines)[is_split]])), degrees
@@ -133,6 +133,7 @@ class FunctionAxis:
         turns: 2 for φ on the half circle, of which T* is normalised on both; 1 otherwise.
         nested: the matrix to the coefficients of a hierarchical basis, in which the functions up to each degree span
             the space of that degree; None where the basis is one.
+        is_orthonormal: whether ∫ u v of its functions is the identity.
         is_followed: whether pairs are followed from p = 0 on; signs of T and T*, not resolved enough, then decide less.
         has_adjoint: whether T* is a function: otherwise its signs alone need not be right.
     """
@@ -143,6 +144,7 @@ class FunctionAxis:
     band = 0
     slowest, slope, turns = 0.0, 0.0, 1
     nested: Any = None
+    is_orthonormal = False
     is_followed, has_adjoint = False, True
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -162,6 +164,17 @@ class FunctionAxis:
     def modes(self) -> IntArray:
         """For each unknown the degree of its polynomial in a cell, shape (size,)."""
         return np.zeros(self.size, dtype=int)
+
+    @cached_property
+    def highest(self) -> tuple[Mask, Mask, IntArray]:
+        """Which functions are of the four highest modes of a cell, which of these of each of the four, and all degrees.
+
+        Shapes (size,), (4, kept functions), from the highest mode on, and (cells,).
+        """
+        degrees = np.zeros(self.cells.max() + 2, dtype=int)  # the last is of no cell
+        np.maximum.at(degrees, self.cells, self.modes)
+        below = np.where(self.cells >= 0, degrees[self.cells] - self.modes, 4)
+        return below < 4, below[below < 4] == np.arange(4)[:, None], degrees[:-1]
 
     @property
     def rule(self) -> Rule:
@@ -314,12 +327,11 @@ class KroneckerSum:
         return KroneckerSum([[each[at] if k == axis else each for k, each in enumerate(term)] for term in self.terms])
 
     def toarray(self) -> FloatArray:
-        """The dense matrix, shape (size, size)."""
-        factors = [np.stack([*map(dense, each)]) for each in zip(*self.terms, strict=True)]
-        rows = np.arange(1, 2 * len(factors), 2).tolist()
-        pairs: list[Any] = [each for k, of_axis in zip(rows, factors, strict=True) for each in (of_axis, [0, k, k + 1])]
-        found = np.einsum(*pairs, [*rows, *(k + 1 for k in rows)], optimize="greedy")
-        return found.reshape(self.size, self.size)
+        """The dense matrix, shape (size, size), by columns."""
+        first = np.stack([dense(phase) for phase, *_ in self.T.terms])
+        others = np.stack([reduce(np.kron, map(dense, each)) for _, *each in self.T.terms])  # type: ignore[arg-type]
+        found = np.tensordot(first, others, (0, 0)).swapaxes(1, 2)
+        return found.reshape(self.size, self.size).T
 
     def tocsc(self) -> csc_matrix:
         """The sparse matrix."""

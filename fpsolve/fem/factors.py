@@ -6,23 +6,29 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import lru_cache, partial, reduce
-from itertools import pairwise
 from threading import RLock
+from typing import Any
 
 import numpy as np
+from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import csc_matrix, identity, kron
 from scipy.sparse.linalg import SuperLU, splu
 from threadpoolctl import ThreadpoolController
 
-from fpsolve.arrays import FloatArray, IntArray, dense
+from fpsolve.arrays import FloatArray, dense
 from fpsolve.budget import timed
 from fpsolve.errors import SingularMatrix
-from fpsolve.fem.axis import FEW_UNKNOWNS, KroneckerSum
+from fpsolve.fem.axis import KroneckerSum
 
+AT_ONCE = 200
+"""Number of unknowns up to which LAPACK takes a matrix as a whole in less time than by levels."""
 LARGEST_GROWTH = 1e3
-"""Largest entry of a P_k over the norm of the matrix, as rows of different levels are not exchanged."""
+"""Largest entry of an A_kk over the norm of the matrix, as rows of different levels are not exchanged."""
 
+np.empty(
+    2**22 - 2**10
+)  # once 32 MB are freed, glibc keeps what arrays up to this size leave rather than maps each anew
 _limited = RLock()
 
 
@@ -59,7 +65,7 @@ def factorised(operator: KroneckerSum, noise: int | None) -> Factors:
         OverBudget: the seconds of a number have passed.
     """
     with timed(operator.size):
-        if operator.size <= FEW_UNKNOWNS:
+        if operator.size <= AT_ONCE:
             return ArrayFactors(operator.toarray())
         if noise is not None:
             with suppress(SingularMatrix):
@@ -84,9 +90,9 @@ class ArrayFactors:
             pivots = np.einsum("ii->i", self._lu)
             pivots[pivots == 0] = np.finfo(float).eps * np.max(np.abs(pivots))
 
-    def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
-        """x of A x = b, or of Aᵀx = b; several b are columns."""
-        return dgetrs(self._lu, self._pivots, b, trans=transposed)[0]
+    def solve(self, b: FloatArray, *, transposed: bool = False, overwrites: bool = False) -> FloatArray:
+        """x of A x = b, or of Aᵀx = b, also in place of b; several b are columns."""
+        return dgetrs(self._lu, self._pivots, b, trans=transposed, overwrite_b=overwrites)[0]
 
 
 class SparseFactors:
@@ -121,68 +127,61 @@ class SparseFactors:
 
 
 class LevelFactors:
-    """LU factors by levels along an axis, of functions that are coupled to those of the next levels only.
+    """LU factors by levels along an axis, each function of which is coupled to a few next to it on both sides.
 
-    The matrix is block tridiagonal: D_k, with U_k above and L_k below. From the last level on, of the functions that
-    noise damps the most,
+    In A_jk rows belong to the function j, and columns to k. From the last function on, which noise damps the most,
 
-        P_k = D_k − U_k P_{k+1}⁻¹ L_k.
+        A_ij ← A_ij − A_ik A_kk⁻¹ A_kj,      i, j < k.
 
     Args:
         operator: the sum.
-        axis: its functions are in the levels, in each as many as its matrices have diagonals on one side.
+        axis: its functions are the levels.
 
     Raises:
-        SingularMatrix: a P_k is singular, of functions that noise moves only by way of those of another level.
+        SingularMatrix: an A_kk is singular, of functions that noise moves only by way of those of another level.
     """
 
     def __init__(self, operator: KroneckerSum, axis: int) -> None:
         self._shape, self._axis = operator.shape, axis
         terms = list(map(list, operator.terms))
         lasts = np.stack([dense(term.pop(axis)) for term in terms])
-        count, most = len(lasts[0]), LARGEST_GROWTH * operator.norm
-        m, (rows, columns) = operator.size // count, np.nonzero(np.any(lasts, axis=0))
-        befores = np.empty((len(terms), m**2))
-        for before, others in zip(befores, terms, strict=True):
-            before[:] = reduce(np.kron, map(dense, others)).T.ravel()  # type: ignore[arg-type]
-        band = max(1, int(np.max(np.abs(rows - columns), initial=0)))
-        groups = np.split(np.arange(count), range(count % band or band, count, band))
-        ends = m * np.cumsum([0, *(group.size for group in groups)])
-        self._parts = [slice(*pair) for pair in pairwise(ends.tolist())]
+        rows, columns = np.nonzero(np.any(lasts, axis=0))
+        band = int(np.max(np.abs(rows - columns), initial=0))
+        others = np.stack([reduce(np.kron, map(dense, term)).T for term in terms])  # type: ignore[arg-type]
+        blocks = {k: np.tensordot(lasts.diagonal(k, 1, 2).T, others, 1) for k in range(-band, band + 1)}
 
-        def between(rows: IntArray, columns: IntArray) -> FloatArray:
-            table = lasts[:, rows[:, None], columns].reshape(len(lasts), -1).T @ befores
-            ordered = table.reshape(rows.size, columns.size, m, m).transpose(1, 2, 0, 3)
-            return np.asarray(ordered.reshape(m * columns.size, m * rows.size).T, order="F")
+        def block(row: int, column: int) -> FloatArray:
+            return blocks[column - row][min(row, column)].T
 
-        self._up = [between(group, after) for group, after in pairwise(groups)]
-        self._pivots, self._quotients = list[ArrayFactors](), list[FloatArray]()
-        for k in range(len(groups) - 1, -1, -1):
-            rest = between(groups[k], groups[k])
-            if self._pivots:
-                self._quotients.insert(0, self._pivots[0].solve(between(groups[k + 1], groups[k])))
-                rest -= self._up[k] @ self._quotients[0]
-            if not np.abs(rest).max() < most:
-                raise SingularMatrix("the pivot of a level is singular")
-            self._pivots.insert(0, ArrayFactors(rest))
+        self._steps = list[tuple[ArrayFactors, list[Any]]]()
+        for k in reversed(range(len(lasts[0]))):
+            pivot = ArrayFactors(block(k, k))
+            before = [(j, block(j, k), block(k, j)) for j in range(max(k - band, 0), k)]
+            for _, _, quotient in before:
+                pivot.solve(quotient, overwrites=True)
+            for i, up, _ in before:
+                for j, _, quotient in before:
+                    dgemm(-1.0, up, quotient, beta=1.0, c=block(i, j), overwrite_c=1)
+            self._steps.append((pivot, before))
+        if not np.abs(blocks[0]).max() < LARGEST_GROWTH * operator.norm:
+            raise SingularMatrix("the pivot of a level is singular")
 
     def solve(self, b: FloatArray, *, transposed: bool = False) -> FloatArray:
         """x of A x = b, or of Aᵀx = b; several b are columns."""
         table = np.moveaxis(b.reshape(*self._shape, *b.shape[1:]), self._axis, 0)
-        rest = table.reshape(b.shape).copy()
-        upward, downward = (self._quotients, self._up) if transposed else (self._up, self._quotients)
-        for k in range(len(self._parts) - 1, -1, -1):
-            own, last = self._parts[k], self._parts[k - 1]
+        rest = table.reshape(len(self._steps), -1, *b.shape[1:]).copy()
+        last = len(rest) - 1
+        for k, (pivot, before) in enumerate(self._steps):
+            own = rest[last - k]
             if not transposed:
-                rest[own] = self._pivots[k].solve(rest[own])
-            if k:
-                rest[last] -= upward[k - 1].T @ rest[own] if transposed else upward[k - 1] @ rest[own]
-        for k, own in enumerate(self._parts):
-            if k:
-                known = rest[self._parts[k - 1]]
-                rest[own] -= downward[k - 1].T @ known if transposed else downward[k - 1] @ known
+                own[:] = pivot.solve(own)
+            for j, up, quotient in before:
+                rest[j] -= (quotient.T if transposed else up) @ own
+        for own, (pivot, before) in zip(rest, reversed(self._steps), strict=True):
+            for j, up, quotient in before:
+                own -= (up.T if transposed else quotient) @ rest[j]
             if transposed:
-                rest[own] = self._pivots[k].solve(rest[own], transposed=True)
+                own[:] = pivot.solve(own, transposed=True)
         return np.moveaxis(rest.reshape(table.shape), 0, self._axis).reshape(b.shape)
 
 

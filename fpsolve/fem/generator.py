@@ -15,9 +15,6 @@ from fpsolve.fem.terms import Noises, Term, Terms
 from fpsolve.model.coordinates import framed
 from fpsolve.model.problem import ParameterDerivative, Problem
 
-KEPT_SPACES = 40
-"""Number of spaces, of the last p, whose matrices are kept."""
-
 
 @dataclass(frozen=True, eq=False)
 class Pencil:
@@ -83,8 +80,6 @@ class Generator:
         """Trial and test functions; the tilt of those of ξ moves with p, and each axis has tables of its own."""
         key, (phi, *axes) = p if self.chosen.is_tilted else 0.0, self.chosen.axes
         if key not in self._spaces:
-            if len(self._spaces) >= KEPT_SPACES:
-                del self._spaces[next(iter(self._spaces))]
             noises = self.problem.valued.parts.values()
             self._spaces[key] = Space([phi, *(axis.of(noise, p) for axis, noise in zip(axes, noises, strict=True))])
         return self._spaces[key]

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -171,7 +171,7 @@ class CountedAxis(NoiseAxis):
         return replace(self, count=min(self.count + 2, MAX_COUNT))
 
     def refined(self, effects: ModeEffects, share: float) -> Self:
-        needed = math.ceil(effects.needed(share)[0] + 1.3)
+        needed = math.ceil(effects.needed(share)[0])
         return replace(self, count=max(self.count // 2, 3, min(needed, 3 * self.count // 2 + 3, MAX_COUNT)))
 
 
@@ -278,6 +278,13 @@ class Table(NamedTuple):
     scale: float
 
 
+@lru_cache(maxsize=64)
+def _hermite_table(count: int) -> Table:
+    """That of Gaussian noise without a tilt."""
+    polynomials, (x, weights) = hermite(count), hermite(count + MORE_POINTS).rule
+    return Table(x, weights, *polynomials.at(x), 0.0, polynomials, 0.0, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class PolynomialAxis(CountedAxis, LineAxis):
     """Orthogonal polynomials: with P_s ~ (1 − x²)^a, x = ξ/ξ_s, and σ² ~ (1 − x²)^b at the ends of the noise those of
@@ -300,8 +307,12 @@ class PolynomialAxis(CountedAxis, LineAxis):
     word = "polynomials"
 
     @property
+    def is_orthonormal(self) -> bool:  # type: ignore[override]
+        return math.isinf(self.noise.half_width)
+
+    @property
     def band(self) -> int:  # type: ignore[override]
-        return 1 if math.isinf(self.noise.half_width) else 3
+        return 1 if self.is_orthonormal else 3
 
     @property
     def size(self) -> int:
@@ -323,10 +334,8 @@ class PolynomialAxis(CountedAxis, LineAxis):
     def rule(self) -> Table:  # type: ignore[override]
         tilt, end = self.tilt, self.noise.half_width / self.unit
         if math.isinf(end):
-            polynomials, (x, weights) = hermite(self.count), hermite(self.count + MORE_POINTS).rule
-            values, slopes = polynomials.at(x)
-            slopes, log_mass = slopes + tilt * values, 2 * tilt**2
-            return Table(x + 2 * tilt, weights, values, slopes, log_mass, polynomials, 2 * tilt, 1.0)
+            x, weights, values, slopes, *_, polynomials, _, _ = _hermite_table(self.count)
+            return Table(x + 2 * tilt, weights, values, slopes + tilt * values, 2 * tilt**2, polynomials, 2 * tilt, 1.0)
         # the exponent a + b − 1 of the weight, and 1 − b, by which P_s falls more; b < 1 counts as 0, for a ≤ 0 as 1
         middle, near = self.noise.squared_diffusion(self.noise.half_width * np.array([0.0, 1 - NEAR_END]))
         missing = float(self.noise.end_exponent > 0 and near >= VANISHES * middle)  # the weight must be integrable

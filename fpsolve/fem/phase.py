@@ -216,6 +216,7 @@ class PhaseAxis(DividedAxis):
     """
 
     terms = PlaneTerms
+    is_orthonormal = True
 
     @cached_property
     def size(self) -> int:

@@ -92,7 +92,8 @@ class Space:
         """The space with another axis in one place."""
         return Space((*self.axes[:k], axis, *self.axes[k + 1 :]))
 
-    def enriched(self) -> Space:
+    @cached_property
+    def finer(self) -> Space:
         """A finer one each way, see each axis: two degrees more, or some polynomials, or half cells."""
         return Space(tuple(axis.enriched() for axis in self.axes))
 
@@ -127,7 +128,8 @@ class Space:
 
     def weighed(self, coefficients: FloatArray) -> FloatArray:
         """∫ P_s w T for every test function w, T a function of the space."""
-        return self.mass @ coefficients
+        weights = [None if axis.is_orthonormal else axis.matrix(one) for axis in self.axes]
+        return along(weights, self.table(coefficients)).reshape(coefficients.shape)
 
     def table(self, coefficients: FloatArray) -> FloatArray:
         """Coefficients of a function by axes, shape `shape`."""

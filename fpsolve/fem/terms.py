@@ -37,18 +37,20 @@ class OfMoment:
 
     Attributes:
         n: the power of p.
-        log_factor: ln R, or several.
+        log_factor: ln R, or several; None for pⁿ alone.
     """
 
     n: int
-    log_factor: Any = 0.0
+    log_factor: Any = None
 
     def __call__(self, p: float, derivative: int) -> Any:
         """Its k-th derivative, by the rule of Leibniz. Raises `FloatingPointError`: it is beyond all numbers."""
-        total = 0.0
-        for j in range(min(self.n, derivative) + 1):
-            of_power = math.comb(derivative, j) * math.perm(self.n, j) * p ** (self.n - j)
-            total = total + of_power * self.log_factor ** (derivative - j)
+        of_power = [math.perm(self.n, j) * p ** max(self.n - j, 0) for j in range(derivative + 1)]
+        if self.log_factor is None:
+            return of_power[-1]
+        total = sum(
+            math.comb(derivative, j) * each * self.log_factor ** (derivative - j) for j, each in enumerate(of_power)
+        )
         with np.errstate(over="raise"):
             return total * np.exp(p * self.log_factor)
 

@@ -109,13 +109,10 @@ def test_progress_of_moments_is_reported_once_for_each(count):
     assert not found.failures
 
 
-def test_root_is_known_where_many_moments_are_interpolated():
+def test_many_moments_are_interpolated():
     many = solve_moments(SOLVER, np.linspace(-2, 6, 33))
-    assert many.root == pytest.approx(SUMMARY_NUMBERS["stability_index"].solve(SOLVER).value, rel=1e-3)
     for pair, value in zip(many.pairs[::8], many.value[::8], strict=True):
         assert pair.value == pytest.approx(value, rel=1e-8)
-    for p in (np.linspace(1, 6, 33), [-1.0, 1.0]):
-        assert solve_moments(SOLVER, p).root is None
 
 
 @pytest.mark.parametrize(

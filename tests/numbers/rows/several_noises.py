@@ -87,6 +87,6 @@ ROWS = [
         "fast and slow noise",
         slow=True,
     ),
-    *even_rows(NODE, "node", 1e-6, (4,), 1e-10, 8),
+    *even_rows(NODE, "node", 1e-6, (4,), 1e-10, 8, rtol=1e-7),
     Row(NODE, slope(4.0), -0.5761729688, 1e-10, 1.0, "five differences of the moment equations"),
 ]
