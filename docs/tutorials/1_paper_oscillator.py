@@ -60,7 +60,7 @@ print(f"the reduction is off by {(reduced.value[0] / second.value[0] - 1):.1%}")
 # All moments
 # -----------
 # :math:`\Lambda` is a convex function of :math:`p` with :math:`\Lambda(0) = 0`. ``MomentLyapunovFunction`` makes it a
-# Python function. This takes 17 solves, however many points you evaluate.
+# Python function. This takes four solves, however many points you evaluate.
 exponent = MomentLyapunovFunction(problem, (-2.0, 6.0))
 p = np.linspace(-2, 6, 201)
 figure, axes = plt.subplots(layout="constrained")
