@@ -366,7 +366,7 @@ class Code(Enum):
     )
     RESPONSE_LINEAR = (
         "note: no stationary response: in this linear system nothing limits the amplitude. A response needs an "
-        "oscillator with c2 or c3 > 0, terms of degree 3, or a delay and a noise of degree 0"
+        "oscillator with c2 or c3 > 0, terms of degree 3, or a noise alone, as in + xi"
     )
     RESPONSE_GROWS = (
         "note: no stationary response is computed: without noise the terms of degree 3 hardly limit large amplitudes, "

@@ -62,7 +62,7 @@ class Curve:
     def values(self, p: FloatArray) -> Values:
         """Λ and its derivatives; the error of Λ′ is that of Markov's bound on the slope of a polynomial."""
         value, slope, second = (self.ratio.deriv(k)(p) for k in range(3))
-        of_slope = np.max(self.ratio_error(self.nodes)) * (1 + self.steepness * np.abs(p))
+        of_slope = (np.max(self.errors) + self.left) * (1 + self.steepness * np.abs(p))
         return Values(p * value, p * slope + value, p * second + 2 * slope, self.ratio_error(p) * np.abs(p), of_slope)
 
 

@@ -45,7 +45,7 @@ from fpsolve.fem.space import Space
 from fpsolve.model.coordinates import mean_matrix
 from fpsolve.model.plane import is_driven
 from fpsolve.model.problem import Problem
-from fpsolve.model.quantity import PHASE, density_unit
+from fpsolve.model.quantity import PHASE
 
 MOST_TILT = 1.5
 """Slope of the tilt in z beyond which rounding leaves nothing of T around the mean of the noise."""
@@ -53,6 +53,8 @@ UNRESOLVED = 0.1
 """Share of an eigenfunction with the wrong sign from which on it misleads."""
 MOST_NEGATIVE = 0.02
 """Share of a density with the wrong sign from which on it misleads."""
+UNITS = {"1/time": "time/rad", "1": "1/rad"}
+"""The unit of a density per radian and unit of ξ, by that of ξ."""
 NODES = 48, 96, 192
 """Numbers of nodes between the ends of a coordinate of directions; there are twice as many steps around."""
 CHUNK = 2**21
@@ -115,7 +117,7 @@ class Grid(ReadOnly):
         phi = frame.own_phase(np.concatenate([axis.points + k * axis.span for k in range(axis.turns)]))
         weights, phi = np.tile(axis.weights, axis.turns) / frame.density(phi), np.mod(phi, 2 * np.pi)
         order = np.argsort(phi)
-        unit = "1/rad" if problem.noise.has_states else density_unit(noise)
+        unit = "1/rad" if problem.noise.has_states else UNITS.get(noise.unit, "unknown")
         return Grid((PHASE, noise), unit, phi[order], at.xi, weights[order], at.measure)
 
     @property

@@ -1,4 +1,4 @@
-"""Stationary first and second moments of a state with delays that noise also forces: dx = … + f(ξ) dt + Σ b_k dW_k.
+"""Stationary first and second moments of a state that noise also forces: dx = … + f(ξ) dt + Σ b_k dW_k.
 
 A variable that is 1 makes all terms linear: the moments of (x, 1) obey Z(0) S = 0, see `delays`, with 1·1 known. So
 the others are one more solve with the same Z. They exist where Λ(2) < 0, and are reached from all starts (for one
@@ -8,16 +8,16 @@ variable U. Küchler and B. Mensch, Stochastics 40 (1992) 23).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from fpsolve.arrays import FloatArray
 from fpsolve.errors import FpsolveError, NotConverged
-from fpsolve.exponent.delays import ROUNDED
 from fpsolve.exponent.moments import FIRST, GROWTH, Equations, even_moment
 from fpsolve.exponent.powers import moment_form
+from fpsolve.exponent.rightmost import ROUNDING
+from fpsolve.fem.factors import sparse_lu
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
@@ -30,14 +30,22 @@ class StationaryMoments:
     """The first and second moments of a stationary state, in the mean over a period where coefficients have one.
 
     Attributes:
-        mean: E x, shape (n,): 0 unless a noise both multiplies and forces the state.
-        square: E x xᵀ, shape (n, n).
-        error_estimate: estimate of |error| of `square`.
+        whole: E yyᵀ of y = (x, 1), shape (n + 1, n + 1).
+        errors: estimates of |error| of these.
     """
 
-    mean: FloatArray
-    square: FloatArray
-    error_estimate: FloatArray
+    whole: FloatArray
+    errors: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        """E x, shape (n,): 0 unless a noise both multiplies and forces the state."""
+        return self.whole[-1, :-1]
+
+    @property
+    def square(self) -> FloatArray:
+        """E x xᵀ, shape (n, n)."""
+        return self.whole[:-1, :-1]
 
     @property
     def covariance(self) -> FloatArray:
@@ -46,7 +54,7 @@ class StationaryMoments:
 
 
 def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoments:
-    """E x and E x xᵀ of a system with delays and terms of degree 0.
+    """E x and E x xᵀ of a system with terms of degree 0, and with delays or without.
 
     Args:
         problem: of a system with a `forced` one.
@@ -63,30 +71,26 @@ def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoment
     if not growth.value < -growth.error:
         raise FpsolveError(Message(Code.RESPONSE_UNSTABLE, value=growth.value, error=growth.error))
     equations = Equations(Problem(problem.linear.forced, problem.noise), 2)
-    before, _ = _solved(equations, 0)
+    before, lost = _solved(equations, 0), ROUNDING + growth.rounding / -growth.value
     for finer in range(1, MOST_FINER + 1):
-        found, rounding = _solved(equations, finer)
-        errors = np.abs(found - before) + rounding
-        squares = np.maximum(np.diag(found)[:-1], 0.0)
+        found = _solved(equations, finer)
+        sizes = np.sqrt(np.maximum(np.diag(found), 0.0))
+        errors, squares = np.abs(found - before) + lost * np.outer(sizes, sizes), sizes[:-1] ** 2
         if np.all(np.diag(errors)[:-1] <= rtol * squares):
-            return StationaryMoments(found[-1, :-1], found[:-1, :-1], errors[:-1, :-1])
+            return StationaryMoments(found, errors)
         before = found
     raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(np.diag(errors)[:-1] / squares))))
 
 
-def _solved(equations: Equations, finer: int) -> Iterator[FloatArray]:
-    """E yyᵀ of y = (x, 1) and what rounding changes, with steps and functions as fine as that."""
+def _solved(equations: Equations, finer: int) -> FloatArray:
+    """E yyᵀ of y = (x, 1), with steps and functions as fine as that."""
     counts = [math.ceil(FIRST * GROWTH**finer)] * len(equations.noises)
     mean, scales = equations.means(counts), equations.scales
-    rates = equations.rates(*equations.over_noise(counts), finer)
-    z, sizes = rates.matrix(0.0), rates.sizes(0.0)
-    is_one = np.arange(len(z)) % scales.size == scales.size - 1  # E 1·1 f
-    moments, rounding = np.zeros((2, len(z)))
+    h = equations.rates(*equations.over_noise(counts), finer).at(0.0).matrix
+    is_one = np.arange(h.shape[0]) % scales.size == scales.size - 1  # E 1·1 f
+    moments = np.zeros(h.shape[0])
     moments[is_one] = mean
-    inverse = np.linalg.inv(z[~is_one][:, ~is_one])
-    moments[~is_one] = -inverse @ (z[~is_one][:, is_one] @ mean)
-    rounding[~is_one] = ROUNDED * np.abs(inverse) @ (sizes[~is_one] @ np.abs(moments))
-    return (
-        moment_form(weights @ each.reshape(-1, scales.size) * (scales / scales[-1]), equations.dimension, 2)
-        for weights, each in ((mean, moments), (np.abs(mean), rounding))
-    )
+    factors = sparse_lu(h[~is_one][:, ~is_one], permc_spec="COLAMD")
+    moments[~is_one] = -factors.solve(h[~is_one][:, is_one] @ mean)
+    whole = mean @ moments.reshape(-1, scales.size) * (scales / scales[-1])
+    return moment_form(whole, equations.dimension, 2)

@@ -146,10 +146,6 @@ def _function(a: Series, value: float, slope: float, curvature: float) -> Series
     return (value, slope * first, slope * second + 0.5 * curvature * first**2)[: len(a)]
 
 
-def _exponential(a: Series) -> Series:
-    return _function(a, *3 * (math.exp(a[0]),))
-
-
 def _logarithm(a: Series, value: float) -> Series:
     """ln of a series, whose first coefficient is known."""
     first, second = (each / a[0] for each in (*a[1:], 0.0, 0.0)[:2])
@@ -166,7 +162,7 @@ def _power(a: Series, power: float) -> Series:
 
 
 FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
-    "exp": _exponential,
+    "exp": lambda a: _function(a, *3 * (math.exp(a[0]),)),
     "sqrt": partial(_power, power=0.5),
 }
 _INVERSE = partial(_power, power=-1.0)

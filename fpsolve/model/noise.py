@@ -123,11 +123,6 @@ class Noise(Parametrised):
         return False
 
     @property
-    def tails_beyond(self) -> tuple[str, float, str] | None:
-        """The parameter that gives it these tails, the largest value without, and what to do; None without tails."""
-        return None
-
-    @property
     def basis(self) -> Literal["polynomials", "cells", "states", "waves", "pairs"]:
         """The basis in which functions of the noise are expanded.
 

@@ -36,7 +36,7 @@ from fpsolve.arrays import (
     shown,
 )
 from fpsolve.model.parameters import Parametrised
-from fpsolve.model.quantity import ResponseQuantities, response_quantities
+from fpsolve.model.quantity import ResponseQuantities, linear_response, response_quantities
 
 Matrix = Sequence[Sequence[float]] | FloatArray
 Xi = ArrayLike | Mapping[str, ArrayLike]
@@ -738,9 +738,8 @@ class LinearMotion(System):
     @property
     def response(self) -> ResponseQuantities:
         """The quantities of its stationary response."""
-        return self.quantities or response_quantities(
-            self.states, has_wall=bool(self.jumps), is_linear=self.forced is not None
-        )
+        given = linear_response(self.forced.names) if self.forced else self.quantities
+        return given or response_quantities(self.states, has_wall=bool(self.jumps))
 
     @property
     def overshoot(self) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 from fpsolve.data import Quantity as Quantity
 
@@ -181,18 +182,15 @@ OSCILLATOR_RESPONSE = ResponseQuantities(
 """The quantities of the response of the paper's oscillator."""
 
 
-def response_quantities(states: Sequence[str], *, has_wall: bool, is_linear: bool = False) -> ResponseQuantities:
-    """The quantities of the response of a system of which only the names of variables are known; one of a linear
-    system has mean squares alone.
-    """
+def response_quantities(states: Sequence[str], *, has_wall: bool) -> ResponseQuantities:
+    """The quantities of the response of a system of which only the names of variables are known."""
     unit, (x, v) = "unknown", (*states, *states)[:2]
-    squares = [(f"{each}_squared", f"⟨{each}²⟩", f"mean of {each}²", unit) for each in states]
     means = _means(
         *((each, f"⟨{each}⟩", f"mean of {each}", unit) for each in (x, v)),
         ("amplitude", "⟨A⟩", "mean of the amplitude", unit),
         ("amplitude_squared", "⟨A²⟩", "mean of the squared amplitude", unit),
         ("amplitude_fourth", "⟨A⁴⟩", "mean of the fourth power of the amplitude", unit),
-        *squares,
+        *((f"{each}_squared", f"⟨{each}²⟩", f"mean of {each}²", unit) for each in states),
     )
     return ResponseQuantities(
         Quantity(x, x, x, unit=unit, dims=(x,)),
@@ -200,10 +198,20 @@ def response_quantities(states: Sequence[str], *, has_wall: bool, is_linear: boo
         replace(AMPLITUDE, latex="$A$", unit=unit),
         replace(JOINT_DENSITY, latex="", words=f"density of ({x}, {v})", unit=unit, dims=(x, v)),
         replace(AMPLITUDE_DENSITY, unit=unit),
-        _means(*squares) if is_linear else means,
+        means,
         has_wall,
         f"ρ({x}, {v})",
     )
+
+
+def linear_response(states: Sequence[str]) -> ResponseQuantities:
+    """Those of a linear system, the first and second moments."""
+    told = (
+        *((f"{x}_squared", f"{x}²") for x in states),
+        *((f"{a}_{b}", f"{a} {b}".removesuffix(" mean")) for a, b in combinations((*states, "mean"), 2)),
+    )
+    means = _means(*((name, f"⟨{each}⟩", f"mean of {each}", "unknown") for name, each in told))
+    return replace(OSCILLATOR_RESPONSE, means=means, has_wall=False)
 
 
 THETA = Quantity("theta", "θ", "parameter", r"$\theta$", "theta_unit", ("parameter",))
@@ -235,8 +243,3 @@ def moment_at(p: float) -> Quantity:
 
 
 MEAN_SQUARE = replace(moment_at(2.0), words="growth of the mean square")
-
-
-def density_unit(noise: Quantity) -> str:
-    """The unit of a density per radian and unit of ξ."""
-    return {"1/time": "time/rad", "1": "1/rad"}.get(noise.unit, "unknown")

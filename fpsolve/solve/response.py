@@ -1,4 +1,4 @@
-"""The stationary response of a parameter set with terms of degree 3, or of degree 0 with a delay."""
+"""The stationary response of a parameter set with terms of degree 3, or of degree 0."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fpsolve.arrays import FloatArray
 from fpsolve.case.case import Case
 from fpsolve.case.sections import RESPONSE
 from fpsolve.exponent.error import Estimate
 from fpsolve.exponent.forced import stationary_moments
 from fpsolve.exponent.method import Budget
-from fpsolve.model.noise import Noise
 from fpsolve.model.problem import Problem
 from fpsolve.solve.question import Job, Numbers, Question, Settings
 from fpsolve.solve.set_result import ResponseDensity, SetResponse, SetResult, estimated
@@ -33,9 +31,9 @@ def solve_response(problem: Problem, rtol: float, grid: Grid | None, budget: Bud
     """The stationary response, with its density if a grid is given, or by moments; raises as what it is found by."""
     if problem.linear.forced:
         moments = stationary_moments(problem, rtol)
-        squares = zip(np.diag(moments.square).tolist(), np.diag(moments.error_estimate).tolist(), strict=True)
-        estimates = [Estimate(value, error, abs(value)) for value, error in squares]
-        return SetResponse(dict(zip(problem.linear.response.means, estimates, strict=True)))
+        pairs, of_all = np.triu_indices(len(moments.whole), 1), (moments.whole, moments.errors, np.abs(moments.whole))
+        columns = [np.append(np.diag(each)[:-1], each[pairs]).tolist() for each in of_all]
+        return SetResponse(dict(zip(problem.linear.response.means, map(Estimate, *columns), strict=True)))
     from fpsolve.nonlinear.response import stationary_response  # 390 ms
 
     found = stationary_response(problem, rtol=rtol, budget=budget)
@@ -55,19 +53,15 @@ def _density(found: StationaryResponse, grid: Grid) -> ResponseDensity:
     problem = found.problem
     a = (np.arange(amplitudes) + 0.5) * found.reach / amplitudes
     phi = found.flow.phases(phases)
-    xi = _values_of(problem.valued, values)
+    noise = problem.valued
+    far = SPREAD * noise.standard_deviation
+    low, high = max(noise.mean - far, -noise.half_width), min(noise.mean + far, noise.half_width)
+    xi = low + (np.arange(values) + 0.5) * (high - low) / values  # the middles of cells
     whole = [found.density([each], phi, xi)[0] for each in a]  # one by one, which takes little memory
     of_plane = found.polar_density(a[:, None], phi)
     return ResponseDensity(
         a, phi, xi, found.amplitude_density(a), of_plane, np.array(whole, dtype=np.float32).astype(float)
     )
-
-
-def _values_of(noise: Noise, count: int) -> FloatArray:
-    """Middles of cells in which nearly all of the noise is."""
-    far = SPREAD * noise.standard_deviation
-    low, high = max(noise.mean - far, -noise.half_width), min(noise.mean + far, noise.half_width)
-    return np.asarray(low + (np.arange(count) + 0.5) * (high - low) / count)
 
 
 def _settings(case: Case, number: int) -> Settings | None:

@@ -285,7 +285,7 @@ BAD = [
             ("-x + xi*x(t + 1)", "the delay is -1; must be > 0"),
             ("-x + xi*y(t - 1)", "y is none of the variables x"),
             ("-x**3 + xi*x(t - 1)", "must be of degree 1"),
-            ("-x + x(t - 1) + 0.3 + xi", "shifts where x rest"),
+            ("-x + x(t - 1) + 0.3 + xi", "only noise may be alone"),
         )
     ),
     (lambda: equations("x' = v; v' = -x + xi*x(t - 1)", [{"at": "x = 0", "restitution": 0.8}]), "none with a delay"),

@@ -25,6 +25,11 @@ LOAD = np.array([[0.0, 0.0], [-1.0, 0.0]])
 
 def even(p, drift, *driven, count=24, near=0.0):
     """Λ(p) of ẋ = (A₀ + Σ ξ_k A_k)x for pairs (A_k, ξ_k), with `count` functions of each ξ_k."""
+    return kronecker.several(np.array(drift), *by_kind(driven, count), p, near)
+
+
+def by_kind(driven, count):
+    """Coloured, white and impulses of such pairs, as `kronecker` takes them."""
     coloured, white, impulses = [], [], []
     for load, noise in driven:
         match noise:
@@ -45,7 +50,7 @@ def even(p, drift, *driven, count=24, near=0.0):
                 coloured.append((load, *kronecker.filtering(law, min(count, 18))))
             case _:
                 coloured.append((load, *kronecker.jumping(noise.states, noise.rates)))
-    return kronecker.several(np.array(drift), coloured, white, impulses, p, near)
+    return coloured, white, impulses
 
 
 def slope_of(value: Callable[..., float], name: str, step: float = 1e-3, **values: float) -> float:

@@ -160,10 +160,6 @@ class NonGaussianNoise(TreatedNoise):
     def has_algebraic_tails(self) -> bool:
         return self.r0 > 1
 
-    @property
-    def tails_beyond(self) -> tuple[str, float, str] | None:
-        return ("r0", 1.0, 'use treatment = "ou-reduction"') if self.has_algebraic_tails else None
-
     def spectral_density(self, omega: float) -> float:
         """S(ω) of the reduced noise, Eq. (16); that of Eq. (7) itself has no closed form."""
         return self.ou_reduction().spectral_density(omega)

@@ -79,12 +79,15 @@ class StatedWall(Section):
     restitution: Annotated[object, parameter("R of v+ = -R v-, a number or an expression", "restitution = 0.8")]
 
 
-def _as_table(value: object) -> object:
-    return value if isinstance(value, dict | StatedParameter) else {"value": value}
-
-
 Parameters = dict[
-    str, Annotated[StatedParameter, BeforeValidator(_as_table, json_schema_input_type=float | StatedParameter)]
+    str,
+    Annotated[
+        StatedParameter,
+        BeforeValidator(
+            lambda value: value if isinstance(value, dict | StatedParameter) else {"value": value},
+            json_schema_input_type=float | StatedParameter,
+        ),
+    ],
 ]
 Texts = Annotated[tuple[str, ...], Field(strict=False, min_length=1, max_length=MOST_VARIABLES)]
 
@@ -357,10 +360,11 @@ class EquationSystem(System):
                 for sign, term in summands(text) if text.strip() != "0" else ():
                     terms.append((i, sign, term, evaluate(term, names, f"{variable}'s rate", of_time)))
         read.rates = [Form({})] * len(self.variables)
+        is_linear = bool(read.delays) or any(not each[0] for *_, form in terms for each in form.parts)
         for i, sign, term, form in terms:
-            if fault := next(filter(None, (self._fault(each, bool(read.delays)) for each in form.parts)), ""):
+            if fault := next(filter(None, (self._fault(each, is_linear) for each in form.parts)), ""):
                 raise TableError(f"the term {shortened(term)} of {self.variables[i]}'s rate {fault}", "drift", i)
-            if any(len(states) == 1 for states, _, _ in form.parts):
+            if any(len(each[0]) == 1 for each in form.parts):
                 read.linear.update(names_in(term))
             read.rates[i] = read.rates[i].plus(form, sign)
         return read
@@ -416,28 +420,20 @@ class EquationSystem(System):
         found = tuple((variable, delay) for variable, (delay, _) in self._read.delays.values())
         return found * 2 if len(found) == len(self.variables) == 1 else found  # a matrix has more than two rows here
 
-    def _fault(self, monomial: Monomial, has_past: bool) -> str:
+    def _fault(self, monomial: Monomial, is_linear: bool) -> str:
         """What is wrong with a product in a rate, and what to do; or nothing."""
         states, noise, _ = monomial
-        degree, names = len(states), ", ".join(self.variables)
-        told = f"is of degree {degree} in {names}"
-        if degree == 0:
-            if has_past and noise:
-                return ""
-            if has_past:
-                return f"shifts where {names} rest; leave it out, and measure them from there"
-            return f"is not linear in {names}; multiply it by one of these, or leave it out"
-        if degree == 1:
+        degree = len(states)
+        told = f"is of degree {degree} in {', '.join(self.variables)}"
+        if not (degree or (noise and not self.walls)):
+            return f"{told}; only noise may be alone, without walls: leave it out, or measure the variables from rest"
+        if degree <= 1:
             return ""
-        if has_past:
-            return f"{told}; with a delay all terms must be of degree 1: leave it out"
-        if len(self.variables) != 2:
-            return f"{told}; of any but two variables all terms must be of degree 1: leave it out"
-        if degree < HIGHEST_DEGREE:
-            return f"{told}; must be of degree 1 or {HIGHEST_DEGREE}: leave it out"
-        return (
-            f"{told} and has the noise {noise}; a noise may only be in terms of degree 1: leave it out" if noise else ""
-        )
+        if is_linear or len(self.variables) != 2:
+            return f"{told}; with a delay, noise alone, or any but two variables it must be of degree 1: leave it out"
+        if degree < HIGHEST_DEGREE or noise:
+            return f"{told}; must be of degree 1 or, without a noise, {HIGHEST_DEGREE}: leave it out"
+        return ""
 
     def _terms_of(self, rates: Sequence[Form], at: int, last: Sequence[str] = ()) -> tuple[CoefficientMatrix, ...]:
         """The terms of rates, of their values for `at` = 0, of their derivatives for 1; those of degree 0 with a last
@@ -472,9 +468,8 @@ class EquationSystem(System):
     @cached_property
     def _linear(self) -> LinearMotion:
         rates, names = self._read.rates, self.variables
-        forced, is_forced = None, any(not states for form in rates for states, _, _ in form.parts)
-        if is_forced:
-            forced = LinearMotion(self._terms_of(rates, 0, [""]), epsilon=self.epsilon, pasts=self.pasts)
+        is_forced = any(not each[0] for form in rates for each in form.parts)
+        whole = LinearMotion(self._terms_of(rates, 0, [""]), epsilon=self.epsilon, pasts=self.pasts, names=names)
         past = (f"{names[k]}(t − {delay:.10g})" for k, delay in self.pasts)
         names = (*names, f"{names[0]}*") if len(names) == 1 and not self.pasts else names  # as `as_plane` has it
         return LinearMotion(
@@ -485,7 +480,7 @@ class EquationSystem(System):
             pasts=self.pasts,
             clock=self.clock,
             cubic=self._cubic(),
-            forced=forced,
+            forced=whole if is_forced else None,
             names=names,
             columns=(*names, *[""] * is_forced, *past),
         )

@@ -21,24 +21,24 @@ def moments_of(problem):
 
 def square(problem):
     found = moments_of(problem)
-    return found.square[0, 0], found.error_estimate[0, 0]
+    return found.square[0, 0], found.errors[0, 0]
 
 
 def mean(problem):
     found = moments_of(problem)
-    return found.mean[0], found.error_estimate[0, 0]
+    return found.mean[0], found.errors[0, 0]
 
 
 def covariance(problem):
     found = moments_of(problem)
-    return found.covariance[0, 0], found.error_estimate[0, 0]
+    return found.covariance[0, 0], found.errors[0, 0]
 
 
 def largest(problem):
     """tr E xxᵀ and all its entries with weights of their own, so that each of them is seen."""
     found = moments_of(problem)
     weights = np.add.outer(np.arange(1.0, len(found.mean) + 1), np.arange(len(found.mean)))
-    return float(np.sum(weights * found.square)), float(np.sum(weights * found.error_estimate))
+    return float(np.sum(weights * found.square)), float(np.sum(weights * found.errors[:-1, :-1]))
 
 
 SQUARE, MEAN, COVARIANCE = Quantity("E x²", square), Quantity("E x", mean), Quantity("Var x", covariance)
@@ -84,6 +84,7 @@ def of_segment(size):
     return segment(drift, [(load, noise)], size).stationary([1.0], noise.probabilities)[0, 0]
 
 
+LOADED = "x' = v; v' = -x - 0.2*v - 0.3*{}*{} + {}*{}"
 K = of_scalar(-1, -0.8, 1)
 AT = 0.1 / (1 - 0.08 - 0.3)
 ROWS = [
@@ -140,6 +141,17 @@ ROWS = [
         1e-12,
         1e-9,
         "what unit noise makes, and the noise at the mean",
+    ),
+    *(
+        Row(rates(LOADED.format(*text), noises), quantity, value, 1e-15, 1e-11, f"white noises, no delay: {text}")
+        for text, noises, quantity, value in (
+            (("xi", "x", 0.2, "xi"), White(s=1.0), SQUARE, 4 / 31),
+            (("xi1", "x", 0.5, "xi2"), [White(s=1.0)] * 2, SQUARE, 0.25 / 0.31),
+            (("xi", "v", 0.2, "xi"), White(s=1.0), MEAN, -0.03),
+            (("xi", "v", 0.2, "xi"), White(s=1.0), SQUARE, 2 / 11 + 0.0009),
+            (("xi", "v", 0.2, "xi"), ITO, MEAN, 0.0),
+            (("xi", "v", 0.2, "xi"), ITO, SQUARE, 4 / 31),
+        )
     ),
     *(spectrum(n) for n in (2, 3, 4)),
     Row(

@@ -1,0 +1,56 @@
+"""First and second moments of systems that noise both multiplies and forces, beside Kronecker products."""
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+from fpsolve import FpsolveError
+from fpsolve.exponent import stationary_moments
+from fpsolve.model import Bounded, Filter, MarkovChain, OrnsteinUhlenbeck, Poisson, SineWiener, Telegraph, White
+from tests.kit import rates
+from tests.numbers.second import by_kind
+from tests.oracles import kronecker
+from tests.oracles.segments import written
+
+NOISES = (
+    White(s=0.5),
+    White(s=0.5, interpretation="ito"),
+    OrnsteinUhlenbeck(alpha=1.5, sigma=1.0),
+    SineWiener(0.8, 1.2),
+    Bounded(mu=0.5, nu=1.5, sigma=0.8),
+    Telegraph(a=0.5, k=0.7),
+    MarkovChain(states=(-0.5, 0.1, 0.6), rates=((-1.0, 0.7, 0.3), (0.2, -0.5, 0.3), (1.0, 0.0, -1.0))),
+    Poisson(1.5, (-0.3, 0.3)),
+    Filter(omega=2.0, zeta=0.3, s=0.4),
+)
+
+
+@pytest.mark.parametrize("seed", range(45))
+def test_moments_are_those_of_kronecker_products(seed):
+    """Of y = (x, 1), ẏ = (A + ξB)y: the noise is the same in the load and in the force."""
+    rng, noise, n = np.random.default_rng(seed), NOISES[seed % 9], 2 + seed // 9 * (2 if seed % 9 < 8 else 0) % 7
+    whole, names = 0.4 * rng.standard_normal((2, n + 1, n + 1)), [f"x{k}" for k in range(n)]
+    whole[0, :, n] = whole[:, n] = 0.0
+    whole[0, :n, :n] -= 1.5 * np.sqrt(n) * np.eye(n)
+    terms = [("", [(0.0, whole[0, :n, :n])]), ("xi*", [(0.0, whole[1, :n, :n])])]
+    text = "; ".join(
+        f"{x}' = {rate}" for x, rate in zip(names, written(terms, names, whole[1, :n, n], "xi"), strict=True)
+    )
+    found = stationary_moments(rates(text, noise))
+
+    coloured, *others = by_kind([(whole[1], noise)], 20)
+    h = kronecker.equations(whole[0], coloured, *others).tocsr()
+    own = coloured[0][1] if coloured else np.zeros((1, 1))
+    mean, sums = (np.linalg.svd(each)[2][-1].conj() for each in (own, own.T))
+    is_one = np.arange(h.shape[0]) % (h.shape[0] // len(own)) == h.shape[0] // len(own) - 1
+    moments = np.zeros(h.shape[0], dtype=complex)
+    moments[is_one] = mean
+    moments[~is_one] = spsolve(h[~is_one][:, ~is_one].tocsc(), -h[~is_one][:, is_one] @ mean)
+    right = (sums @ moments.reshape(len(own), -1) / (sums @ mean)).real
+    at = np.triu_indices(n + 1)
+    assert np.all(np.abs(found.whole[at] - right) <= found.errors[at] + 1e-9 * np.max(right))
+
+
+def test_there_are_none_where_the_mean_square_grows():
+    with pytest.raises(FpsolveError, match=r"Λ\(2\) = 2.3\d* ± \S+ is not negative"):
+        stationary_moments(rates("x' = v; v' = -x - 0.2*v - 3*xi*x + 0.2*xi", OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)))
