@@ -17,10 +17,11 @@ from fpsolve.errors import FpsolveError, NotConverged
 from fpsolve.exponent.moments import FIRST, GROWTH, Equations, even_moment
 from fpsolve.exponent.powers import moment_form
 from fpsolve.exponent.rightmost import ROUNDING
-from fpsolve.fem.factors import sparse_lu
 from fpsolve.messages import Code, Message
 from fpsolve.model.problem import Problem
 
+NEXT_TO_NULL, STEPS = 1e-3, 6
+"""σ of inverse iteration, over the rate at which moments decay, and its steps, which leave 1e-18."""
 MOST_FINER = 6
 """Largest number of times that steps and functions are made finer."""
 
@@ -68,29 +69,34 @@ def stationary_moments(problem: Problem, rtol: float = 1e-6) -> StationaryMoment
     if problem.linear.forced is None:
         raise FpsolveError(Message(Code.RESPONSE_LINEAR))
     growth = even_moment(problem, 2)
-    if not growth.value < -growth.error:
+    decay, before = -growth.value, np.array(np.inf)
+    if not decay > growth.error:
         raise FpsolveError(Message(Code.RESPONSE_UNSTABLE, value=growth.value, error=growth.error))
     equations = Equations(Problem(problem.linear.forced, problem.noise), 2)
-    before, lost = _solved(equations, 0), ROUNDING + growth.rounding / -growth.value
-    for finer in range(1, MOST_FINER + 1):
-        found = _solved(equations, finer)
+    for finer in range(MOST_FINER + 1):
+        found, left = _solved(equations, decay, finer)
         sizes = np.sqrt(np.maximum(np.diag(found), 0.0))
+        lost = ROUNDING + (growth.rounding + left) / decay
         errors, squares = np.abs(found - before) + lost * np.outer(sizes, sizes), sizes[:-1] ** 2
-        if np.all(np.diag(errors)[:-1] <= rtol * squares):
+        own = np.diag(errors)[:-1]
+        if np.all(own <= rtol * squares):
             return StationaryMoments(found, errors)
         before = found
-    raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(np.diag(errors)[:-1] / squares))))
+    raise NotConverged(Message(Code.RESPONSE_OPEN, size=float(np.max(own / squares))))
 
 
-def _solved(equations: Equations, finer: int) -> FloatArray:
-    """E yyᵀ of y = (x, 1), with steps and functions as fine as that."""
+def _solved(equations: Equations, decay: float, finer: int) -> tuple[FloatArray, float]:
+    """E yyᵀ of y = (x, 1), the null vector m of H, and |Hm|/|m|, with steps and functions as fine as that.
+
+    By inverse iteration: each step divides what is left, which decays at a rate, by about this rate over σ.
+    """
     counts = [math.ceil(FIRST * GROWTH**finer)] * len(equations.noises)
-    mean, scales = equations.means(counts), equations.scales
-    h = equations.rates(*equations.over_noise(counts), finer).at(0.0).matrix
-    is_one = np.arange(h.shape[0]) % scales.size == scales.size - 1  # E 1·1 f
-    moments = np.zeros(h.shape[0])
-    moments[is_one] = mean
-    factors = sparse_lu(h[~is_one][:, ~is_one], permc_spec="COLAMD")
-    moments[~is_one] = -factors.solve(h[~is_one][:, is_one] @ mean)
-    whole = mean @ moments.reshape(-1, scales.size) * (scales / scales[-1])
-    return moment_form(whole, equations.dimension, 2)
+    mean = equations.means(counts)
+    moments = np.kron(mean, np.eye(equations.scales.size)[-1])
+    h = equations.rates(*equations.over_noise(counts), finer).at(0.0)
+    inverse = h.inverse(NEXT_TO_NULL * decay, moments.size, ROUNDING)
+    for _ in range(STEPS):
+        moments = NEXT_TO_NULL * decay * inverse(moments)
+    whole = mean @ moments.reshape(mean.size, -1) * equations.scales
+    left = float(np.linalg.norm(h @ moments) / np.linalg.norm(moments))
+    return moment_form(whole / whole[-1], equations.dimension, 2), left

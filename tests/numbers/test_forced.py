@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_lyapunov
 from scipy.sparse.linalg import spsolve
 
 from fpsolve import FpsolveError
@@ -49,6 +50,26 @@ def test_moments_are_those_of_kronecker_products(seed):
     right = (sums @ moments.reshape(len(own), -1) / (sums @ mean)).real
     at = np.triu_indices(n + 1)
     assert np.all(np.abs(found.whole[at] - right) <= found.errors[at] + 1e-9 * np.max(right))
+
+
+def test_moments_of_many_variables_are_those_of_lyapunov_s_equation():
+    """Of 60 variables under white noise: E xxᵀ by its fixed point, as BE yyᵀBᵀ is small."""
+    rng, n = np.random.default_rng(0), 60
+    a, b = 0.1 * rng.standard_normal((n, n)) - 2 * np.eye(n), 0.03 * rng.standard_normal((n, n + 1))
+    names = [f"x{k}" for k in range(n)]
+    texts = zip(names, written([("", [(0.0, a)]), ("xi*", [(0.0, b[:, :n])])], names, b[:, n], "xi"), strict=True)
+    found = stationary_moments(rates("; ".join(f"{x}' = {rate}" for x, rate in texts), White(s=1.0)))
+
+    whole = np.vstack([b, np.zeros(n + 1)])
+    drift = a + 0.5 * (whole @ whole)[:n, :n], 0.5 * (whole @ whole)[:n, n]
+    mean = -np.linalg.solve(*drift)
+    square, push = np.zeros((n, n)), np.outer(drift[1], mean)
+    for _ in range(60):
+        of_all = np.block([[square, mean[:, None]], [mean, 1.0]])
+        square = solve_continuous_lyapunov(drift[0], -(push + push.T + b @ of_all @ b.T))
+    assert np.all(np.abs(found.mean - mean) <= found.errors[-1, :-1] + 1e-14)
+    assert np.all(np.abs(found.square - square) <= found.errors[:-1, :-1] + 1e-14)
+    assert np.max(found.errors) < 1e-11
 
 
 def test_there_are_none_where_the_mean_square_grows():
