@@ -13,9 +13,8 @@ from fpsolve.arrays import FloatArray, require
 from fpsolve.data import Parameters, Quantity, Result, dataset
 from fpsolve.drawing import MOST_LINES, QUARTERS, draw_line, draw_plane
 from fpsolve.errors import NotConverged
-from fpsolve.exponent.density import GRIDS, MOST_NEGATIVE, DirectionGrid, Grid, densities, evaluated
+from fpsolve.exponent.density import MOST_NEGATIVE, DirectionGrid, Grid, densities
 from fpsolve.exponent.eigen import PrincipalPair
-from fpsolve.fem.phase import vertices_at
 from fpsolve.messages import Code, Message, Remedy
 
 if TYPE_CHECKING:
@@ -151,7 +150,10 @@ def stationary_density(pair: PrincipalPair) -> Density | DirectionDensity:
         NotConverged: too much of it is negative; `partial` is what was found.
         ValueError: the pair is not the one at p = 0.
     """
-    return _density(_of_zero(pair), "stationary")
+    require(pair, PrincipalPair, "pair", PAIR)
+    if pair.p:
+        raise ValueError(f"the stationary density is T* at p = 0, but the pair has p = {pair.p:g}")
+    return _density(pair, "stationary")
 
 
 def adjoint_density(pair: PrincipalPair) -> Density | DirectionDensity:
@@ -182,39 +184,3 @@ def _density(pair: PrincipalPair, kind: Literal["stationary", "adjoint", "tilted
     if (share := density.negative_share()) > MOST_NEGATIVE:
         raise NotConverged(Message(Code.NEGATIVE_DENSITY, name=name, p=pair.p, size=share), density, Remedy.CELLS)
     return density
-
-
-def furstenberg_khasminskii(pair: PrincipalPair) -> float:
-    """λ = ∫(ε q₁ξ + ε² q₂) ρ dφ dξ + ω ln R ∫[ρ(π/2, ξ) + ρ(3π/2, ξ)] dξ, with ρ from the pair at p = 0.
-
-    ω ρ, in other systems |dφ/dt| ρ, is the probability flux through an impact, on its side of approach. The
-    log-amplitude jumps by ln R there.
-
-    Raises:
-        ValueError: the pair is not the one at p = 0, several noises have values, or there are more than two variables.
-    """
-    problem, axis = pair.generator.problem, pair.space.phi
-    if problem.dimension in GRIDS:
-        raise ValueError("the formula is for two variables, but there are more; use lyapunov_exponent")
-    if len(problem.valued.parts) > 1:
-        raise ValueError("the formula is for one noise that is not white, but there are several; use lyapunov_exponent")
-    framed = pair.generator.framed
-    system, phi, at = framed.motion, axis.points[:, None], _of_zero(pair).space.xi.samples()
-    rate = system.growth_rate(at.xi)(phi)
-    for each in system.diffusions:  # ½ h q′, by which q ∘ dW has a mean
-        rate = rate + 0.5 * system.epsilon ** (2 * each.order) * each.h(phi) * each.q.slope(phi)
-    for struck in system.impulses:
-        rate = rate + struck.rate * np.log(struck.stretched(phi)[0])
-    growth = float(axis.weights @ (rate * evaluated(pair, axis.values, at).T_adjoint) @ at.measure)
-    for jump, speed in zip(system.jumps, framed.wall_speeds(system), strict=True):
-        met = axis.traces[0 if speed > 0 else 1][vertices_at(axis.lines, jump.phase)]
-        growth += abs(speed) * jump.log_factor * float(np.sum(evaluated(pair, met, at).T_adjoint @ at.measure))
-    return pair.space.turns * growth
-
-
-def _of_zero(pair: PrincipalPair) -> PrincipalPair:
-    """The pair, which must be that at p = 0. Raises `ValueError`."""
-    require(pair, PrincipalPair, "pair", PAIR)
-    if pair.p == 0:
-        return pair
-    raise ValueError(f"the stationary density is the adjoint eigenfunction at p = 0, but the pair has p = {pair.p:g}")

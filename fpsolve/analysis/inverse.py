@@ -28,7 +28,7 @@ from fpsolve.analysis.axis import Axis, bounds_of, check_ends, check_key
 from fpsolve.analysis.scan import TOLERANCE, Sample
 from fpsolve.analysis.spreads import cube
 from fpsolve.analysis.target import Distance, Target, is_none, target_of
-from fpsolve.arrays import FloatArray, real_number, require
+from fpsolve.arrays import FloatArray, require
 from fpsolve.data import Result, dataset, written
 from fpsolve.errors import FpsolveError, NoSuchExponent, NotConverged
 from fpsolve.exponent.error import Absent, Estimate
@@ -108,14 +108,13 @@ def design(
     target: str,
     by: str | Axis | Sequence[str | Axis],
     *,
-    units: Mapping[str, float] | None = None,
     budget: Budget | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Design | Absent:
     """The values of parameters with which λ, Λ(p) or δ_p has a wanted value, or that it cannot be reached.
 
     With several parameters it is the nearest point: the least √(Σ xᵢ²), x the
-    changes of the parameters in their units. Where several points serve it is one that the steps find from the
+    changes of the parameters over their values. Where several points serve it is one that the steps find from the
     values of the problem.
 
     >>> design(problem, "moment(2) = -0.008", "oscillator.c1")
@@ -126,8 +125,6 @@ def design(
         target: such as "stability_index = 1", "lyapunov_exponent = -0.01" or "moment(2) = 0".
         by: the parameters by their keys, each with its range as an `Axis`; of a key alone that is from half to twice
             its value.
-        units: of changes of some parameters, by their keys; if omitted, the absolute value of the parameter, or for 0
-            the width of its range.
         budget: for a solve.
         progress: called after each solve.
 
@@ -138,7 +135,7 @@ def design(
     """
     require(by, Axis | Sequence, "by", 'a parameter such as "noise.D0", an Axis, or a list of these')
     wanted, axes = target_of(target), axes_of(problem, by)
-    measures = units_of(problem, axes, units or {})
+    measures = units_of(problem, axes)
     rtol, keys = choose(problem).line_rtol(wanted.order), [axis.key for axis in axes]
     distance = Distance(problem, wanted, keys, rtol=rtol, budget=budget or Budget())
     tried, here = _Tried(distance, progress), np.array([float(problem.values[axis.key]) for axis in axes])
@@ -185,17 +182,9 @@ def axes_of(problem: Problem, by: str | Axis | Sequence[str | Axis]) -> tuple[Ax
     return tuple(found)
 
 
-def units_of(problem: Problem, axes: Sequence[Axis], stated: Mapping[str, float]) -> dict[str, float]:
-    """What a change of each parameter is measured by. Raises `ValueError`."""
-    found = {}
-    for axis in axes:
-        unit = real_number(stated.get(axis.key, abs(float(problem.values[axis.key])) or axis.stop - axis.start), "unit")
-        if not unit > 0:
-            raise ValueError(f"got the unit {unit:g} of {axis.key}; must be > 0")
-        found[axis.key] = unit
-    if unknown := [key for key in stated if key not in found]:
-        raise ValueError(f"got a unit of {unknown[0]}, which is no parameter of the design; remove it")
-    return found
+def units_of(problem: Problem, axes: Sequence[Axis]) -> dict[str, float]:
+    """What a change of each parameter is measured by: its absolute value, or for 0 the width of its range."""
+    return {axis.key: abs(float(problem.values[axis.key])) or axis.stop - axis.start for axis in axes}
 
 
 def start_and_stop(problem: Problem, key: str) -> Axis | None:
@@ -261,7 +250,7 @@ def _unreached(tried: _Tried, target: Target, axes: Sequence[Axis], is_crossed: 
     if target.kind == "stability_index":
         about["side"] = target.side(nearest.value)
     else:
-        values = [target.level + each.value for each in samples]
+        values = [target.at(each.value) for each in samples]
         about |= {"symbol": target.quantity.symbol, "least": min(values), "most": max(values)}
     return Absent(Message(Code.UNREACHED, **about))
 

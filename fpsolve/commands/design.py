@@ -96,7 +96,8 @@ def design(
     Example: fpsolve design cases/theorem.toml --for "stability_index = 1" --by oscillator.c1 --from -1 --to 1
 
     Args:
-        target: What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01' or 'moment(2) = 0'.
+        target: What is wanted: 'stability_index = 1', 'lyapunov_exponent = -0.01',
+            'moment(2) = 0', or 'square(x) = 0.01' of a forced motion.
         start: Smallest value of each --by; if omitted, half of its value.
         stop: Largest value of each --by; if omitted, twice its value.
         json: Print design.json, one line for each case.

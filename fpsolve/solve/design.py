@@ -46,7 +46,7 @@ class DesignOutcome:
         scale = max(self.found.found.scale, abs(self.target.value))
         least = max(10 * self.found.found.error_estimate, case.rtol * scale)
         return {
-            "quantity": self.target.kind, **order, "value": self.target.value, "atol": float(f"{least:.1g}"),
+            "quantity": self.target.name, **order, "value": self.target.value, "atol": float(f"{least:.1g}"),
             "source": "fpsolve design",
         }  # fmt: skip
 
@@ -77,8 +77,7 @@ def wanted_of(
     problem, ranges = case.problem, list[str | Axis]()
     try:
         wanted = target_of(target)
-        p = wanted.p if wanted.kind == "moment" else 0.0
-        if told := case.method.reason(p, wanted.quantity.symbol):
+        if told := case.method.reason(wanted.order, wanted.quantity.symbol):
             raise ValueError(told)
         for i, key in enumerate(by):
             if start and stop:
@@ -98,7 +97,7 @@ def solve_design(case: Case, target: str, by: tuple[Axis, ...], progress: Callab
     Args:
         progress: called after each solve.
     """
-    outcome = DesignOutcome(target_of(target), by, units_of(case.problem, by, {}))
+    outcome = DesignOutcome(target_of(target), by, units_of(case.problem, by))
     try:
         found = nearest_design(case.problem, target, by, budget=case.budget, progress=progress)
     except FpsolveError as failure:

@@ -82,7 +82,6 @@ REFUSED = {
         "Budget(unknowns=1e3)": "unknowns",
         "Budget(seconds=0.0)": "seconds",
         "Budget(seconds=math.inf)": "seconds",
-        "furstenberg_khasminskii(ExponentSolver(BOTH, rtol=1e-4).pair(0.0))": "the formula is for one noise",
         "Noises(dict.fromkeys('abc', UNIT))": "at most 2 noises may be other than white",
         "Noises({'a': HEAVY, 'b': UNIT})": "algebraic tails",
         "Problem(BOTH.system, {'xi1': UNIT, 'side': UNIT})": "the noises given are 'xi1', 'side'",

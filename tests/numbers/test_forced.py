@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import solve_continuous_lyapunov
 from scipy.sparse.linalg import spsolve
 
-from fpsolve import FpsolveError
+from fpsolve import FpsolveError, boundary, design
+from fpsolve.analysis import Axis
 from fpsolve.exponent import stationary_moments
 from fpsolve.model import Bounded, Filter, MarkovChain, OrnsteinUhlenbeck, Poisson, SineWiener, Telegraph, White
 from tests.kit import rates
@@ -75,3 +76,41 @@ def test_moments_of_many_variables_are_those_of_lyapunov_s_equation():
 def test_there_are_none_where_the_mean_square_grows():
     with pytest.raises(FpsolveError, match=r"Λ\(2\) = 2.3\d* ± \S+ is not negative"):
         stationary_moments(rates("x' = v; v' = -x - 0.2*v - 3*xi*x + 0.2*xi", OrnsteinUhlenbeck(alpha=1.0, sigma=1.0)))
+
+
+LOAD_AND_FORCE = "x' = v; v' = -x - c*v - k*xi*x + f*xi"
+"""⟨x²⟩ = f²s²/(2c − k²s²) under white noise, and Λ(2) = 0 where k²s² = 2c."""
+
+
+def loaded(**values):
+    return rates(LOAD_AND_FORCE, White(s=1.0), **{"c": 0.2, "k": 0.3, "f": 0.2, **values})
+
+
+@pytest.mark.parametrize(
+    ("key", "stop", "value"),
+    [("system.k", 2.0, np.sqrt(0.2)), ("system.c", 1.0, 0.145), ("noise.s", 2.0, np.sqrt(0.4 / 0.29))],
+)
+def test_design_finds_a_mean_square(key, stop, value):
+    """Also from where there is none, beyond k² = 2c."""
+    found = design(loaded(), "square(x) = 0.2", Axis(key, 0.01, stop))
+    assert abs(found.values[key].value - value) <= found.values[key].error_estimate < 1e-7
+    assert abs(found.found.value - 0.2) <= found.found.error_estimate < 1e-9
+
+
+def test_design_tells_what_mean_squares_there_are():
+    found = design(loaded(), "square(v) = 0.01", Axis("system.c", 0.1, 0.5))
+    assert found.reason.data["least"] == pytest.approx(0.04 / (1 - 0.09))
+    with pytest.raises(FpsolveError, match="must be of x, v"):
+        design(loaded(), "square(xi) = 1", "system.c")
+    with pytest.raises(FpsolveError, match="no stationary response"):
+        design(rates("x' = v; v' = -x - c*v - xi*x", White(s=1.0), c=0.2), "square(x) = 1", "system.c")
+
+
+def test_line_of_a_mean_square_is_that_of_its_closed_form():
+    """s²(k² + f²/v) = 2c, next to k²s² > 2c, where there is none; its points are as near as they say."""
+    line = boundary(loaded(), "square(x) = 3", Axis("system.k", 0.0, 1.0), Axis("noise.s", 0.1, 1.5), nodes=5, step=0.1)
+    [branch] = line.branches
+    off = branch.y - np.sqrt(0.4 / (branch.x**2 + 0.04 / 3))
+    assert np.all(np.abs(off) <= 1e-8)
+    assert np.ptp(branch.x) > 0.5
+    assert np.all(branch.width < 1e-8)

@@ -23,7 +23,7 @@ from fpsolve import (
     stability_index,
     stationary_density,
 )
-from fpsolve.analysis import Axis, furstenberg_khasminskii
+from fpsolve.analysis import Axis
 from fpsolve.exponent import (
     critical_impact_factor,
     critical_restitution,
@@ -143,7 +143,6 @@ def test_rate_of_impacts_is_the_slope_of_lambda_over_the_logarithm_of_the_factor
     loss, gain = (each.lyapunov_exponent().value for each in solvers)
     for each in solvers:
         assert impact_rate(each).value == pytest.approx((gain - loss) / 0.3, abs=1e-8)
-    assert furstenberg_khasminskii(solvers[0].pair(0.0)) == pytest.approx(loss, abs=1e-9)
 
 
 @pytest.mark.parametrize(("noise", "law"), sampled(*product((HEAVY, BOUNDED, WEAK), ("delta", "restitution")), keep=3))

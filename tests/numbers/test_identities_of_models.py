@@ -24,7 +24,6 @@ from fpsolve import (
     stationary_density,
     tilted_density,
 )
-from fpsolve.analysis import furstenberg_khasminskii
 from fpsolve.exponent import critical_impact_factor, critical_restitution, even_moment, impact_rate
 from fpsolve.model import (
     Bounded,
@@ -126,7 +125,6 @@ def test_state_x_and_velocity_has_the_numbers_and_derivatives_of_x_and_velocity_
         found = ExponentSolver(plain, make_mesh(phi_cells=8)).moments(2.0)
         assert abs(found.value[0] - moment_lyapunov(uniform, 2.0).value[0]) <= found.error_estimate[0] < 1e-5
     pair = ExponentSolver(plain, rtol=1e-9).pair(0.0)
-    assert furstenberg_khasminskii(pair) == pytest.approx(numbers(uniform)[2], abs=1e-8)
     for density in (stationary_density(pair), tilted_density(ExponentSolver(plain).pair(2.0))):
         assert density.phi_weights @ density.values @ density.xi_weights == pytest.approx(1.0, abs=1e-12)
         assert density.phi_weights.sum() == pytest.approx(2 * math.pi, rel=1e-6)
@@ -319,7 +317,6 @@ def test_rate_of_impacts_under_white_noise_in_itos_sense_is_the_slope_of_the_exp
     solver = ExponentSolver(first, rtol=1e-10)
     change = ExponentSolver(second, rtol=1e-10).lyapunov_exponent().value - solver.lyapunov_exponent().value
     assert impact_rate(solver).value == pytest.approx(change / math.log(0.9 / 0.8), rel=1e-8)
-    assert furstenberg_khasminskii(solver.pair(0.0)) == pytest.approx(solver.lyapunov_exponent().value, abs=1e-8)
 
 
 def test_critical_restitution_is_a_root_of_the_exponent_whatever_the_law_of_the_wall():
