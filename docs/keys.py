@@ -9,7 +9,7 @@ from typing import get_args
 
 from fpsolve.case import Case
 from fpsolve.exponent import Budget
-from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.kinds import KINDS, kind_of
 from fpsolve.model.parameters import example_of, meaning_of
 
 PAGE = Path(__file__).parent / "reference/keys.md"
@@ -64,12 +64,12 @@ def keys() -> str:
     """Every key of a case file, from the declarations that check it."""
     about = "These are all keys of a case file, from the code that checks them. [Case files](cases.md) has examples."
     text = f"# Keys\n\n{about}\n\n## Sections\n{_fields(Case.model_fields)}"
-    for name in SYSTEMS:
-        kind = system_kind(name)
+    for name in KINDS["system"]:
+        kind = kind_of("system", name)
         text += f'\n## `[system]` with `kind = "{name}"`\n\n{_first(kind)}\n'
         text += _fields({**kind.stated, **kind.__pydantic_fields__})
-    for name in NOISES:
-        usual = noise_kind(name)
+    for name in KINDS["noise"]:
+        usual = kind_of("noise", name)
         for kind in (usual, *usual.variants):
             own = [
                 f"`{key}`"

@@ -26,6 +26,7 @@ from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray, require, shortened
 from fpsolve.case.explain import explain, refuse
+from fpsolve.case.keys import place_of
 from fpsolve.case.kinds import half_of, kinds_of, system_of
 from fpsolve.case.read_vary import EXAMPLE, vary_of
 from fpsolve.case.refusals import REFUSALS
@@ -86,6 +87,8 @@ CHEAP_OF_WALLS = (IMPACT_RATE.name, CRITICAL_IMPACT_FACTOR.name)
 """What is computed in addition of a system with walls."""
 MOST_DRAWN = 10
 """Of so many parameter sets at most the response is computed unasked, and densities of it are written."""
+MOST_TOLD = 15
+"""Largest number of parameters that a figure names."""
 USUAL_P = 2.0
 
 
@@ -129,7 +132,7 @@ class ParameterSet:
     @property
     def digest(self) -> str:
         """What tells it from all parameter sets of all cases, in 64 letters; its problem is not made for that."""
-        stated = [self.base.form, sorted(self.parameters.items())]
+        stated = [repr(self.base), sorted(self.parameters.items())]
         return sha256(json.dumps(stated).encode()).hexdigest()
 
     @property
@@ -148,11 +151,14 @@ class ParameterSet:
         return "" if self.number == 1 else f"-{self.number}"
 
     def fixed(self, time_unit: str, varied: Collection[str] = ()) -> list[str]:
-        """The parameters but the varied ones in words, without the nonlinear ones that are 0, for a figure."""
-        known, linear = self.problem.parameters, self.problem.differentiable
-        left = {*varied, *(key for key, each in known.items() if each.value == 0 and key not in linear)}
-        fixed = {key: value for key, value in self.parameters.items() if key not in left}
-        return [known[key].quantity.timed(time_unit).stated(value) for key, value in fixed.items()]
+        """The first parameters but the varied ones, without the nonlinear ones that are 0, in words, for a figure."""
+        linear = self.problem.differentiable
+        told = [
+            each.quantity.timed(time_unit).stated(each.value)
+            for key, each in self.problem.parameters.items()
+            if key not in varied and (each.value or key in linear)
+        ]
+        return told[:MOST_TOLD] + ["…"] * (len(told) > MOST_TOLD)
 
 
 class Case(Section):
@@ -458,7 +464,7 @@ def load_case(path: str | Path, overrides: Sequence[str] = (), options: Mapping[
     try:
         case = Case.model_validate(data, context=context)
         for key in case.vary.keys:  # which replaces what the command line says of it
-            if document.places.get(key, Place()).typed:
+            if document.places.get(place_of(data, key), Place()).typed:
                 remedy = f"write --set 'vary.\"{key}\"=[…]', or --set 'vary={{}}' as well"
                 faults.append(document.fault((key,), key, f"has no effect, as the case varies {key}; {remedy}"))
     except ValidationError as error:

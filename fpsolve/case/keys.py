@@ -25,6 +25,13 @@ def put(table: dict[str, object], key: str, value: object) -> None:
     put(child, inner, value)
 
 
+def place_of(table: Mapping[str, object], key: str) -> str:
+    """Where a parameter is stated: as "system.parameters.omega" or "system.parameters.omega.value"; else the key."""
+    section, _, name = key.rpartition(".")
+    places = (f"{place}{inner}" for place in (key, f"{section}.parameters.{name}") for inner in (".value", ""))
+    return next((each for each in places if get(table, each) is not None), key)
+
+
 def leaves(
     table: Mapping[str, object], is_value: Container[str] = (), section: str = ""
 ) -> Iterator[tuple[str, object]]:

@@ -10,21 +10,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import ValidationError, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from fpsolve.case.explain import UNBOUNDED, Refusal, refuse, told, validated
-from fpsolve.case.matrices import with_matrices
+from fpsolve.case.matrices import OF_MATRICES, with_matrices
 from fpsolve.model.faults import TableError, fields_of, nearest, shown, table_of
-from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.kinds import KINDS, Half, kind_of
 from fpsolve.model.noises.several import noises_of
 from fpsolve.model.parameters import Parametrised, Words
 from fpsolve.model.problem import Problem
 
-Half = Literal["system", "noise"]
 USUAL: Mapping[Half, str] = {"system": "vibro-impact", "noise": "non-gaussian"}
 """The kinds of sections that name none."""
 REDUCED = "ou-reduction"
@@ -43,7 +42,7 @@ def half_of(half: Half, table: Any, info: ValidationInfo) -> Any:
         return table
     if half == "system":
         folder = (info.context or {}).get("folder", Path())
-        return made_of(half, with_matrices(table, folder) if table.get("kind") == "modes" else table)
+        return made_of(half, with_matrices(table, folder) if table.get("kind") in OF_MATRICES else table)
     names, system = names_of(table), info.data.get("system")
     if system is not None:
         refuse(_misnamed(names, system.noise_sections))
@@ -81,16 +80,16 @@ def made_of(half: Half, table: Mapping[str, object]) -> Parametrised:
     known = {**dict.fromkeys(table_of(table.get("parameters")), UNBOUNDED), **fields_of(kind)}
     given = {key: value for key, value in table.items() if key != "kind"}
     named = {key: given.pop(key) for key in kind.naming if key in given}
-    is_own = {key: key not in kind.stated and (key in known or kind.takes(key, table)) for key in given}
+    own = {key: given.pop(key) for key in kind.__pydantic_fields__ if key in given}
     about = Words()
     try:
         about = Words(**named)
-        stated = validated(kind.stated, {key: value for key, value in given.items() if not is_own[key]})
+        stated = validated(kind.stated, given)
     except ValidationError as error:
         faults, stated = error.errors(), {}
     if not (faults and any(field.is_required() for field in kind.stated.values())):
         try:
-            made = kind.from_table({key: value for key, value in given.items() if is_own[key]} | stated).called(about)
+            made = kind.from_table(own | stated).called(about)
         except ValidationError as error:
             faults += error.errors()
         except (ValueError, TypeError) as error:
@@ -108,11 +107,11 @@ def _kind(half: Half, table: Mapping[str, Any]) -> type[Parametrised]:
         name = EQUATIONS
     if half == "noise" and name in (None, USUAL[half]) and table.get("treatment") == REDUCED:
         name = REDUCED
-    names = [*(SYSTEMS if half == "system" else NOISES)]
+    names = [*KINDS[half]]
     if name is not None and name not in names:
         text = f"got {shown(name)}; must be one of {', '.join(names)};{nearest(name, names)}"
         refuse([(("kind",), f'{text} write, for example, kind = "{names[0]}"')])
-    kind = (system_kind if half == "system" else noise_kind)(name or USUAL[half])
+    kind = kind_of(half, name or USUAL[half])
     return max((kind, *kind.variants), key=lambda each: len(table.keys() & fields_of(each).keys()))
 
 

@@ -12,7 +12,8 @@ from tomlkit.items import Item, Table
 
 from fpsolve.case.case import Case
 from fpsolve.case.explain import is_number
-from fpsolve.case.keys import get, put
+from fpsolve.case.keys import get, leaves, place_of, put
+from fpsolve.case.matrices import KEYS
 from fpsolve.case.toml import document_of, loads
 from fpsolve.model.faults import table_of
 
@@ -50,8 +51,8 @@ def _data(case: Case, folder: Path) -> dict[str, object]:
     document = document_of(case.text)
     for change in case.overrides:
         document.override(change, change)
-    for key in ("mesh.file", "vary.file"):
-        if isinstance(file := get(document.data, key), str):
+    for key, file in leaves(document.data):
+        if isinstance(file, str) and {*key.split(".")[1:2]} & {"file", *KEYS}:
             put(document.data, key, Path(os.path.relpath(case.path.parent / file, folder)).as_posix())
     return document.data
 
@@ -60,11 +61,9 @@ def _set(data: dict[str, object], key: str, value: float | str) -> None:
     """Set a parameter where a case states it, or else as the only value of a key that is varied."""
     section, _, name = key.rpartition(".")
     for base in (section, "system") if section == "oscillator" else (section,):
-        for place in (f"{base}.{name}", f"{base}.parameters.{name}"):
-            for each in (place, f"{place}.value"):
-                if is_number(get(data, each)):
-                    put(data, each, value)
-                    return
+        if is_number(get(data, place := place_of(data, f"{base}.{name}"))):
+            put(data, place, value)
+            return
     data["vary"] = {**table_of(data.get("vary")), key: [value]}
 
 

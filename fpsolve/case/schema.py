@@ -7,7 +7,6 @@ checked when a case is read.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal
@@ -17,23 +16,15 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 
 from fpsolve.case.case import Case
-from fpsolve.case.kinds import EQUATIONS, USUAL, Half
-from fpsolve.case.sections import OPEN
+from fpsolve.case.kinds import EQUATIONS, USUAL
 from fpsolve.data import plain_unit
 from fpsolve.model.faults import fields_of
-from fpsolve.model.kinds import NOISES, SYSTEMS, noise_kind, system_kind
+from fpsolve.model.kinds import KINDS, Half, kind_of
 from fpsolve.model.parameters import STRICT, Parametrised
 
 SCHEMA = "fpsolve.schema.json"
 """What the file is called that case files name."""
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
-
-
-class NamedParameters(BaseModel):
-    """A table with further keys for parameters, which are numbers."""
-
-    model_config = OPEN
-    __pydantic_extra__: dict[str, float]
 
 
 class _Generator(GenerateJsonSchema):
@@ -78,10 +69,9 @@ def schema_text() -> str:
 
 def _union(half: Half) -> Any:
     """The type of a table of any kind, told by the key that names it, or by being without one."""
-    find: Callable[[str], type[Parametrised]] = system_kind if half == "system" else noise_kind
     models = list[type[BaseModel]]()
-    for name in SYSTEMS if half == "system" else NOISES:
-        variants = ((kind := find(name)), *kind.variants)
+    for name in KINDS[half]:
+        variants = ((kind := kind_of(half, name)), *kind.variants)
         models += (_table(half, each, i) for i, each in enumerate(variants))
         if name in (USUAL[half], EQUATIONS):
             models.append(_table(half, kind, is_named=False))
@@ -95,11 +85,8 @@ def _table(half: Half, kind: type[Parametrised], variant: int = 0, *, is_named: 
     name = f"{half}_{kind.kind}{f'_{variant + 1}' if variant else ''}{'' if is_named else '_without_kind'}"
     if is_named:
         known = {"kind": (Literal[kind.kind], _described(f"the kind of the {half}", f'kind = "{kind.kind}"'))} | known
-    own = kind.__mro__[: kind.__mro__.index(Parametrised)]
-    is_open = any("takes" in vars(each) for each in own)
-    base: dict[str, Any] = {"__base__": NamedParameters} if is_open else {"__config__": STRICT}
     doc = (kind.__doc__ or kind.kind).strip().partition("\n")[0]
-    return create_model(name, __doc__=doc, **base, **known)
+    return create_model(name, __doc__=doc, __config__=STRICT, **known)
 
 
 def _described(text: str, example: str) -> FieldInfo:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fpsolve.arrays import shortened
-from fpsolve.case.keys import get, put
+from fpsolve.case.keys import get, place_of, put
 from fpsolve.errors import CaseError, Fault
 from fpsolve.files import Unreadable, Words, read_text
 from fpsolve.messages import is_control
@@ -180,25 +180,26 @@ class Document:
             assigned = Scanner(text).scan().assigned
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
-            path: Keys = assigned[0]
-            put(self.data, dotted(path), get(loads(text), dotted(path)))
+            value = get(loads(text), key := dotted(assigned[0]))
+            place = key if isinstance(value, dict) else place_of(self.data, key)
+            put(self.data, place, value)
         except RecursionError:
             self.faults.append(Fault(typed, None, _TOO_DEEP))
         except ValueError as error:
             examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
             self.faults.append(Fault(typed, None, f"{error}; write it as in {examples}"))
         else:
-            inside = dotted(path) + "."
-            self.places = {key: place for key, place in self.places.items() if not key.startswith(inside)}
-            self.places[dotted(path)] = Place(typed=typed)
+            path = place.split(".")
+            self.places = {key: each for key, each in self.places.items() if not key.startswith(f"{place}.")}
+            self.places[place] = Place(typed=typed)
             for end in range(1, len(path)):
-                self.places.setdefault(dotted(path[:end]), Place(typed=typed))
+                self.places.setdefault(".".join(path[:end]), Place(typed=typed))
 
 
 def _quoted_if_bare(text: str) -> str:
     """key=word as key="word": a shell takes the quotes away."""
     key, _, value = map(str.strip, text.partition("="))
-    is_word = re.fullmatch(r"[A-Za-z./~][\w./~ -]*", value) and value not in ("true", "false", "nan", "inf")
+    is_word = re.fullmatch(r"[A-Za-z./~][\w./~: -]*", value) and value not in ("true", "false", "nan", "inf")
     return f'{key}="{value}"' if is_word else text
 
 

@@ -1,6 +1,5 @@
 from .equation import equations_of as equations_of
-from .kinds import noise_kind as noise_kind
-from .kinds import system_kind as system_kind
+from .kinds import kind_of as kind_of
 from .noise import Noise as Noise
 from .noises.bounded import Bounded as Bounded
 from .noises.bounded import SineWiener as SineWiener
@@ -23,6 +22,7 @@ from .plane import ParameterDerivative as ParameterDerivative
 from .plane import System as System
 from .problem import Problem as Problem
 from .systems.equations import EquationSystem as EquationSystem
+from .systems.matrices import MatrixSystem as MatrixSystem
 from .systems.modal import ModalSystem as ModalSystem
 from .systems.parametric import ParametricOscillator as ParametricOscillator
 from .systems.plane_system import LinearSystem as LinearSystem

@@ -1,8 +1,8 @@
 """Arithmetic in texts: numbers, names, + − * / **, pi, exp and sqrt.
 
 A text is parsed, and one walk over its tree gives its value: nothing in it is ever run. A value is a polynomial in what
-the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are Taylor series in one
-parameter. So the matrices, their orders in ε and their derivatives are all exact.
+the names stand for, at most of degree 3 in the state and 1 in the noise, whose coefficients are numbers with their
+derivatives by one parameter. So the matrices, their orders in ε and their derivatives are all exact.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from keyword import iskeyword
-from operator import add
 
 from fpsolve.arrays import shortened
 from fpsolve.model.parameters import without_unit
 
-Series = tuple[float, ...]
-"""Taylor coefficients in one parameter, the value first, three at most; all in one calculation have one length."""
+Series = tuple[float, float]
+"""A value and its derivative by one parameter."""
 Monomial = tuple[tuple[str, ...], str, int]
 """The variables of the state that are multiplied, in order, a noise or "", and the power of ε."""
 NUMBER: Monomial = (), "", 0
@@ -93,16 +92,16 @@ class Form:
     def plus(self, other: Form, sign: float = 1.0) -> Form:
         """The sum."""
         total = dict(self.parts)
-        for key, series in other.parts.items():
-            known = total.get(key, (0.0,) * len(series))
-            total[key] = tuple(a + sign * b for a, b in zip(known, series, strict=True))
+        for key, (value, slope) in other.parts.items():
+            known = total.get(key, (0.0, 0.0))
+            total[key] = known[0] + sign * value, known[1] + sign * slope
         return Form(total)
 
     def times(self, other: Form) -> Form:
         """The product. Raises `_Unsuitable` where its degree is too high."""
-        total = dict[Monomial, Series]()
-        for (x, xi, n), a in self.parts.items():
-            for (y, eta, m), b in other.parts.items():
+        total = Form({})
+        for (x, xi, n), (a, a_slope) in self.parts.items():
+            for (y, eta, m), (b, b_slope) in other.parts.items():
                 for is_wrong, reason in (
                     (len(x + y) > HIGHEST_DEGREE, TOO_STEEP),
                     (xi and eta, NOT_AFFINE),
@@ -110,9 +109,9 @@ class Form:
                 ):
                     if is_wrong:
                         raise _Unsuitable(*reason)
-                key, series = (tuple(sorted(x + y)), xi or eta, n + m), _product(a, b)
-                total[key] = tuple(map(add, total[key], series)) if key in total else series
-        return Form(total)
+                key = tuple(sorted(x + y)), xi or eta, n + m
+                total = total.plus(Form({key: (a * b, a * b_slope + a_slope * b)}))
+        return total
 
     def of(self, function: Callable[[Series], Series]) -> Form:
         """A function of it. Raises `_Unsuitable` where it is no number."""
@@ -126,9 +125,9 @@ OfTime = Callable[[str, str, str], Form | None]
 """What a call is, by its name, its argument and how it is written; None where it is none of the time."""
 
 
-def constant(*series: float) -> Form:
-    """A number, with its further Taylor coefficients."""
-    return Form({NUMBER: series})
+def constant(value: float, slope: float = 0.0) -> Form:
+    """A number, with its derivative."""
+    return Form({NUMBER: (value, slope)})
 
 
 def product(*states: str, noise: str = "", power: int = 0) -> Form:
@@ -136,20 +135,9 @@ def product(*states: str, noise: str = "", power: int = 0) -> Form:
     return Form({(states, noise, power): (1.0, 0.0)})
 
 
-def _product(a: Series, b: Series) -> Series:
-    return tuple(sum(a[i] * b[k - i] for i in range(k + 1)) for k in range(len(a)))
-
-
-def _function(a: Series, value: float, slope: float, curvature: float) -> Series:
-    """A function of a series, of three coefficients at most, from its value and its first derivatives there."""
-    first, second = (*a[1:], 0.0, 0.0)[:2]
-    return (value, slope * first, slope * second + 0.5 * curvature * first**2)[: len(a)]
-
-
-def _logarithm(a: Series, value: float) -> Series:
-    """ln of a series, whose first coefficient is known."""
-    first, second = (each / a[0] for each in (*a[1:], 0.0, 0.0)[:2])
-    return (value, first, second - 0.5 * first * first)[: len(a)]
+def _function(a: Series, value: float, slope: float) -> Series:
+    """A function of a series, from its value and its derivative there."""
+    return value, slope * a[1]
 
 
 def _power(a: Series, power: float) -> Series:
@@ -157,12 +145,11 @@ def _power(a: Series, power: float) -> Series:
     if a[0] < 0 and not power.is_integer():
         raise _Unsuitable(*NOT_REAL)
     value = 1 / a[0] if power == -1 else a[0] ** power
-    slope = power * value / a[0] if any(a[1:]) else 0.0
-    return _function(a, value, slope, (power - 1) * slope / a[0] if slope else 0.0)
+    return _function(a, value, power * value / a[0] if a[1] else 0.0)
 
 
 FUNCTIONS: Mapping[str, Callable[[Series], Series]] = {
-    "exp": lambda a: _function(a, *3 * (math.exp(a[0]),)),
+    "exp": lambda a: _function(a, *2 * (math.exp(a[0]),)),
     "sqrt": partial(_power, power=0.5),
 }
 _INVERSE = partial(_power, power=-1.0)
@@ -236,7 +223,7 @@ def evaluate(text: str, names: Mapping[str, Form], place: str, of_time: OfTime |
 
     Args:
         text: the expression.
-        names: what names stand for; all series of one length.
+        names: what names stand for.
         place: what it is, for messages: "v's rate".
         of_time: what x(t - tau) and cos(nu*t) are, by their names, their arguments and how they are written; None
             where there may be none of these.
@@ -270,10 +257,10 @@ def log_of(text: str, names: Mapping[str, Form], place: str) -> Series:
     if not scalar[0] > 0:
         raise ExpressionError(f"{place} is {scalar[0]:.6g}; must be > 0; change it or its parameters")
     if not 0.5 < scalar[0] < 2:
-        return _logarithm(scalar, math.log(scalar[0]))
+        return _function(scalar, math.log(scalar[0]), 1 / scalar[0])
     forms = [(sign, evaluate(term, names, place)) for sign, term in summands(text)]
     firsts = [sign * form.scalar[0] for sign, form in forms if form.scalar]
-    return _logarithm(scalar, math.log1p(math.fsum([*firsts, -1.0])))
+    return _function(scalar, math.log1p(math.fsum([*firsts, -1.0])), 1 / scalar[0])
 
 
 def _chain(node: ast.expr, *kinds: type[ast.operator]) -> list[tuple[float, ast.expr]]:
@@ -290,7 +277,6 @@ class _Walk:
 
     def __init__(self, line: str, names: Mapping[str, Form], place: str, of_time: OfTime | None) -> None:
         self._line, self._names, self._place, self._of_time, self._level = line, names, place, of_time, 0
-        self._rest = next((series[1:] for form in names.values() for series in form.parts.values()), ())
 
     def _source(self, node: ast.expr) -> str:
         return self._line[node.col_offset : node.end_col_offset]
@@ -330,7 +316,7 @@ class _Walk:
         """The value of a node from those below it. Raises `ExpressionError`, `_Unsuitable`, `ArithmeticError`."""
         match node:
             case ast.Constant() if not math.isnan(number := self._read(node)):
-                return self._number(number)
+                return constant(number)
             case ast.Name(id=name):
                 return self._named(name)
             case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op, operand=inner):
@@ -341,7 +327,7 @@ class _Walk:
                     total = total.plus(self.value(each), sign)
                 return total
             case ast.BinOp(op=ast.Mult() | ast.Div()):
-                total = self._number(1.0)
+                total = constant(1.0)
                 for sign, each in _chain(node, ast.Mult, ast.Div):
                     total = total.times(self.value(each) if sign > 0 else self.value(each).of(_INVERSE))
                 return total
@@ -351,12 +337,9 @@ class _Walk:
                 return self._call(node)
         raise ExpressionError(f"has {self.written(node)}, which is no arithmetic; {_KNOWN}")
 
-    def _number(self, value: float) -> Form:
-        return constant(value, *(0.0 * each for each in self._rest))
-
     def _named(self, name: str) -> Form:
         if name in CONSTANTS:
-            return self._number(CONSTANTS[name])
+            return constant(CONSTANTS[name])
         try:
             return self._names[name]
         except KeyError:
@@ -371,7 +354,7 @@ class _Walk:
         form = self.value(base)
         if not power.is_integer():
             return form.of(partial(_power, power=power))
-        total = self._number(1.0)
+        total = constant(1.0)
         for _ in range(abs(int(power))):
             total = total.times(form)
         return total.of(_INVERSE) if power < 0 else total

@@ -3,47 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from importlib import import_module
-from operator import attrgetter
+from typing import Literal, cast
 
-from fpsolve.model.noise import Noise
-from fpsolve.model.plane import System
+from fpsolve.model.parameters import Parametrised
 
-SYSTEMS: Mapping[str, str] = {
-    "vibro-impact": "VibroImpactOscillator",
-    "parametric": "ParametricOscillator",
-    "equations": "EquationSystem",
-    "modes": "ModalSystem",
+Half = Literal["system", "noise"]
+KINDS: Mapping[Half, Mapping[str, str]] = {
+    "system": {
+        "vibro-impact": "VibroImpactOscillator",
+        "parametric": "ParametricOscillator",
+        "equations": "EquationSystem",
+        "modes": "ModalSystem",
+        "linear": "MatrixSystem",
+    },
+    "noise": {
+        "non-gaussian": "NonGaussianNoise",
+        "ou-reduction": "ReducedNoise",
+        "ornstein-uhlenbeck": "OrnsteinUhlenbeck",
+        "sine-wiener": "SineWiener",
+        "white": "White",
+        "poisson": "Poisson",
+        "telegraph": "Telegraph",
+        "markov-chain": "MarkovChain",
+        "bounded": "Bounded",
+        "filter": "Filter",
+    },
 }
-NOISES: Mapping[str, str] = {
-    "non-gaussian": "NonGaussianNoise",
-    "ou-reduction": "ReducedNoise",
-    "ornstein-uhlenbeck": "OrnsteinUhlenbeck",
-    "sine-wiener": "SineWiener",
-    "white": "White",
-    "poisson": "Poisson",
-    "telegraph": "Telegraph",
-    "markov-chain": "MarkovChain",
-    "bounded": "Bounded",
-    "filter": "Filter",
-}
+"""The classes of `fpsolve.model` by these names."""
 
 
-@cache
-def system_kind(name: str) -> type[System]:
-    """The class of a kind of system. Raises `ValueError` where there is none."""
-    return _kind(name, SYSTEMS)
-
-
-@cache
-def noise_kind(name: str) -> type[Noise]:
-    """The class of a kind of noise. Raises `ValueError` where there is none."""
-    return _kind(name, NOISES)
-
-
-def _kind(name: str, known: Mapping[str, str]) -> type:
+def kind_of(half: Half, name: str) -> type[Parametrised]:
+    """The class of a kind of system or noise. Raises `ValueError` where there is none."""
+    known = KINDS[half]
     if name not in known:
         raise ValueError(f'got kind = "{name}"; must be one of {", ".join(known)}')
-    kind: type = attrgetter(known[name])(import_module("fpsolve.model"))
-    return kind
+    return cast("type[Parametrised]", getattr(import_module("fpsolve.model"), known[name]))

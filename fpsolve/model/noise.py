@@ -33,14 +33,19 @@ class Noise(Parametrised):
         left_in_phase: share of the effect of two modes of φ that is left at least where T is not analytic, as where the
             phase rests in a state, or at φ that white noise does not move: there it falls unevenly, and ever more
             slowly.
-        of_xi: by the names of the parameters whose unit contains that of ξ their units, {} in place of that of ξ and
-            "*". Their declared unit is that for ξ in 1/time.
     """
 
     section: ClassVar[str] = "noise"
     left_in_phase: ClassVar[float] = 0.0
-    of_xi: ClassVar[Mapping[str, str]] = {}
     naming = Words.model_fields
+
+    @property
+    def of_xi(self) -> Mapping[str, str]:
+        """By the names of the parameters whose unit contains that of ξ their units, {} in place of that of ξ and "*".
+
+        Their declared unit is that for ξ in 1/time.
+        """
+        return {}
 
     @property
     def has_states(self) -> bool:

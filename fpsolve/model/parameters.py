@@ -184,11 +184,6 @@ class Parametrised:
     __pydantic_fields__: ClassVar[Mapping[str, FieldInfo]] = {}
 
     @classmethod
-    def takes(cls, key: str, table: Table) -> bool:
-        """Whether a table of a case file may have a key besides the parameters and what is `stated`."""
-        return False
-
-    @classmethod
     def from_table(cls, table: Table) -> Parametrised:
         """What a table of a case file states. Raises `ValueError` where a parameter is out of range."""
         return cls(**table)
@@ -232,7 +227,13 @@ class Parametrised:
         return ()
 
     def at(self, values: Mapping[str, float | str]) -> Self:
-        """A system or a noise with other values of some parameters. Raises `ValueError` where one is out of range."""
+        """It with other values of some parameters. Raises `ValueError` where there is none, or it is out of range."""
+        for name in values:
+            if name not in self.values:
+                raise ValueError(f"got {name}; the parameters are {', '.join(self.values) or 'none'}")
+        return self._with(values)
+
+    def _with(self, values: Mapping[str, float | str]) -> Self:
         made: Self = replace(cast("Any", self), **values)
         return made
 

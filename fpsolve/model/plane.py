@@ -253,9 +253,7 @@ class CoefficientMatrix:
 
     @cached_property
     def fastest(self) -> tuple[float, float]:
-        """The largest |e′ᵀA e| and |eᵀA e|, e′ across a unit vector e; beyond the plane ‖A‖ is taken for the first."""
-        if len(self.matrix) == 2:
-            return float(abs(self.h.mean) + self.h.amplitude), float(abs(self.q.mean) + self.q.amplitude)
+        """‖A‖, and the largest |eᵀA e| of a unit vector e."""
         a = np.array(self.matrix)
         return float(np.linalg.norm(a, 2)), float(np.linalg.norm(a + a.T, 2) / 2)
 
@@ -719,11 +717,10 @@ class LinearMotion(System):
     def angular_frequency(self) -> float:
         """The system's own unit of rates: ω where its order 0 rotates, else the norm of the order 0.
 
-        ω is the imaginary part of the eigenvalues of the matrix of order 0, beyond the plane the largest.
+        ω is the largest imaginary part of the eigenvalues of the matrix of order 0.
         """
         a = self.matrix_at(0.0, slice(0, 1))
-        square = float(squared_frequency(a)) if len(a) == 2 else float(np.max(np.linalg.eigvals(a).imag)) ** 2
-        return math.sqrt(square) if square > 0 else float(np.linalg.norm(a))
+        return float(np.max(np.linalg.eigvals(a).imag) or np.linalg.norm(a))
 
     @property
     def driven_by(self) -> Sequence[str]:

@@ -122,21 +122,6 @@ class Problem:
             {f"{section}.{name}": value for section, half in halves for name, value in half.values.items()}
         )
 
-    @cached_property
-    def form(self) -> str:
-        """All that it is but for the values of its parameters, as text.
-
-        The class of a kind that has words follows from these, which are among the values.
-        """
-        found, sections = list[tuple[str, str, dict[str, str]]](), dict[str, Any](self.sections)
-        for section, half in sections.items():
-            values, name = half.values, "" if half.words else type(half).__qualname__
-            others = {each.name: repr(vars(half)[each.name]) for each in fields(half) if each.repr}
-            stated = repr(tuple(values.items()))
-            kept = {name: text for name, text in others.items() if name not in values and text != stated}
-            found.append((section, name, kept))
-        return repr(found)
-
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """All parameters by their keys, with symbol, words, unit and range; no two have one symbol."""

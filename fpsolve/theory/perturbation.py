@@ -266,7 +266,7 @@ def scale_of(problem: Problem) -> Scale:
     Perturbation theory overstates strong noise.
 
     In the sum the constant terms, with the mean of the noise, count by the largest |Re| of their eigenvalues. Noise of
-    strength c and correlation time τ counts by c min(1, c τ). White noise counts by ½ q max(h, q), the largest of each.
+    strength c and correlation time τ counts by c min(1, c τ). White noise counts by ½ ‖B‖ max |eᵀB e|.
     A jump counts once in a half-turn. Impulses that stretch by e^s count by their rate times s min(1, s).
     """
     own, of_noises = framed(problem), dict[str, float]()
@@ -288,8 +288,7 @@ def scale_of(problem: Problem) -> Scale:
     for name, size in of_noises.items():
         driven += size * min(1.0, size * problem.named_noise(name).correlation_time) if size else 0.0
     for each in system.diffusions:
-        h, q = (system.epsilon**each.order * speed for speed in each.fastest)
-        driven += 0.5 * q * max(h, q)
+        driven += 0.5 * system.epsilon ** (2 * each.order) * math.prod(each.fastest)
     driven += sum(each.rate * each.strength * min(1.0, each.strength) for each in system.impulses)
     sizes = Scale(float(np.max(np.abs(np.linalg.eigvals(steady).real))) + jumps + driven, driven)
     theory = None

@@ -2,13 +2,14 @@
 
 import json
 import tomllib
+from functools import partial
 
 import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 from pydantic import ValidationError
 from scipy import sparse
-from scipy.io import mmwrite
+from scipy.io import mmwrite, savemat
 
 from fpsolve import CaseError, load_case
 from fpsolve.case import Case
@@ -246,7 +247,7 @@ def test_one_noise_in_two_spellings(tmp_path, one, other):
     base = SMALL.replace("noise = { D0 = 1, tau0 = 1, r0 = 0.9 }\n", "")
     first, second = (case_in(tmp_path, f"{base}[noise]\n{each}").problem for each in (one, other))
     assert first == second
-    assert "chain" not in one or first.noise == MarkovChain.telegraph(0.5, 1.0)
+    assert "chain" not in one or first.noise == MarkovChain((-0.5, 0.5), ((-1.0, 1.0), (1.0, -1.0)))
 
 
 @pytest.mark.parametrize("pair", [("alpha", "sigma"), ("alpha", "standard_deviation"), ("D0", "tau0")])
@@ -332,26 +333,48 @@ second = { kind = "white", s = 0.2 }
 """
 
 
-def test_matrices_of_modes_in_files_are_those_in_the_case(tmp_path):
-    """ẋ = v and v̇ = −M⁻¹(K x + C v), each beside another."""
-    here = case_in(tmp_path, MODES)
-    mass, stiffness, damping = (
-        np.array(tomllib.loads(MODES)["system"][each]) for each in ("mass", "stiffness", "damping")
+SYSTEM = MODES[MODES.index("[system]") : MODES.index("noises =")]
+LINEAR, RATES = (
+    MODES.replace(SYSTEM, f"[system]\n{own}\n")
+    for own in (
+        """kind = "linear"
+matrix = [[0, 1, 0], [-1, -0.2, 0.3], [0, -0.3, -1]]
+noise_matrices = { a = [[0, 0, 0], [-1, 0, 0], [0, 0, 0]], b = [[0, 0, 0], [0, -1, 0], [0, 0, 0.5]] }
+variables = ["x", "v", "u"]""",
+        """variables = ["x", "v", "u"]
+drift = ["v", "-x - 0.2*v + 0.3*u - a*x - b*v", "-0.3*v - u + 0.5*b*u"]""",
     )
-    np.save(tmp_path / "mass.npy", mass)
-    mmwrite(tmp_path / "stiffness.mtx", sparse.csr_array(stiffness))
-    np.savetxt(tmp_path / "damping.csv", damping, delimiter=",")
-    mmwrite(tmp_path / "load.mtx", np.eye(3))
-    names = ['mass="mass.npy"', 'stiffness="stiffness.mtx"', 'damping="damping.csv"', 'stiffness_noise.a="load.mtx"']
-    terms = case_in(tmp_path, MODES, [f"system.{each}" for each in names]).system.terms
-    assert terms == here.system.terms
-    still = sum(np.array(term.matrix) for term in terms if not term.noise)
-    at, rate = np.arange(0, 6, 2), np.arange(1, 6, 2)
-    np.testing.assert_array_equal(still[np.ix_(at, rate)], np.eye(3))
-    np.testing.assert_allclose(still[np.ix_(rate, at)], -np.linalg.solve(mass, stiffness), atol=1e-15)
-    np.testing.assert_allclose(still[np.ix_(rate, rate)], -np.linalg.solve(mass, damping), atol=1e-15)
-    [driven] = [np.array(term.matrix) for term in terms if term.noise == "second"]
-    np.testing.assert_allclose(driven[np.ix_(rate, at)], -np.diag([0, 0.5, 0]), atol=1e-15)
+)
+WRITERS = {
+    ".mat": lambda path, each: savemat(path, {"A": sparse.csc_array(each)}),
+    ".npy": np.save,
+    ".mat:B": lambda path, each: savemat(path[:-2], {"A": each.T, "B": each}),
+    ".mtx": lambda path, each: mmwrite(path, sparse.csr_array(each)),
+    ".csv": partial(np.savetxt, delimiter=","),
+}
+
+
+@pytest.mark.parametrize("text", [MODES, LINEAR])
+def test_matrices_in_files_are_those_in_the_case_wherever_a_design_puts_it(tmp_path, text):
+    here, changes, system = case_in(tmp_path, text), [], tomllib.loads(text)["system"]
+    key = next(each for each in ("stiffness_noise", "noise_matrices") if each in system)
+    system |= {f"{key}.{name}": each for name, each in system[key].items()}
+    stated = [(key, each) for key, each in system.items() if np.ndim(each) == 2]
+    for (key, each), (ending, write) in zip(stated, WRITERS.items(), strict=False):
+        write(str(tmp_path / f"{key}{ending}"), np.array(each))
+        changes.append(f"system.{key}={key}{ending}")
+    assert case_in(tmp_path, text, changes).problem == here.problem
+    options = [f"--set={each}" for each in changes]
+    done = run(tmp_path, "design", "test.toml", "--for", "moment(2) = -0.0775", "--by", "noise.second.s", *options)
+    assert (done.code, load_case(tmp_path / "results/test/design.toml").system.terms) == (0, here.system.terms)
+
+
+def test_a_state_matrix_is_that_of_its_rates_and_one_of_several_in_a_file_has_a_name(tmp_path):
+    found, wanted = (case_in(tmp_path, each).problem.linear for each in (LINEAR, RATES))
+    assert (found.terms, found.states) == (wanted.terms, wanted.states)
+    savemat(tmp_path / "all.mat", {"A": np.eye(3), "B": np.eye(3)})
+    with pytest.raises(CaseError, match=r"holds A, B: name one of these, as in all\.mat:A"):
+        case_in(tmp_path, LINEAR, ["system.matrix=all.mat"])
 
 
 FIG1, EQUATIONS, MATHIEU, CHART = "fig1", "systems/own_equation", "systems/stochastic_mathieu", "chart"

@@ -111,15 +111,6 @@ def test_deep_nesting_is_refused_within_a_second(tmp_path, override):
     assert time.process_time() - started < 1
 
 
-def test_more_parameters_than_two_hundred_are_refused(tmp_path):
-    text = snapshots.good("equations").replace(
-        "omega = 1.0,", "omega = 1.0, " + "".join(f"p{i} = 1.0, " for i in range(199))
-    )
-    assert (
-        "system.parameters: got 201 parameters; must be at most 200" in run(tmp_path, "run", "case.toml", case=text).err
-    )
-
-
 def powers(low, high):
     """Numbers of any size between these."""
     return st.sampled_from([10.0**low, 10.0**high]) | st.floats(low, high).map(lambda power: 10.0**power)

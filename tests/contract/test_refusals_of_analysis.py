@@ -64,7 +64,7 @@ def test_axes_that_are_none(change, words):
     [
         ({"x": Axis("oscillator.mass", 0.0, 1.0)}, 'x.key: got "oscillator.mass";.* must be one of .*epsilon'),
         ({"x": Axis("oscillator.c2", 0.0, 1.0)}, 'got "oscillator.c2";.* c2 and c3 are not in the linear theory'),
-        ({"problem": oscillator(CHAIN), "x": Axis("noise.D0", 0.1, 1.0)}, 'got "noise.D0"; .*epsilon; choose'),
+        ({"problem": oscillator(CHAIN), "x": Axis("noise.D0", 0.1, 1.0)}, 'got "noise.D0"; .*noise.rate_2_1; choose'),
         ({"x": C1}, 'got "oscillator.c1" for both axes; .*choose another for one of them'),
         ({"x": "oscillator.omega"}, 'x: got "oscillator.omega" as an axis; must be an Axis'),
         ({"x": Axis("oscillator.omega", 0.0, 1.0)}, "x.start: got 0.0; oscillator.omega must be .* >= 1e-15"),

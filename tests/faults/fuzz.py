@@ -31,7 +31,7 @@ from fpsolve import FpsolveError, Problem
 from fpsolve.analysis import Axis
 from fpsolve.exponent import Budget
 from fpsolve.fem import read_mesh, write_mesh
-from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener
+from fpsolve.model import CoefficientMatrix, Jump, MarkovChain, SineWiener, Telegraph
 from tests import kit
 from tests.conftest import heed_signals
 
@@ -229,7 +229,7 @@ def solved_plane(**options: Any) -> Any:
 
 def solved_chain(**options: Any) -> Any:
     """λ with telegraph noise."""
-    return fpsolve.lyapunov_exponent(Problem(OSCILLATOR, MarkovChain.telegraph(**options)), **NUMERICS)
+    return fpsolve.lyapunov_exponent(Problem(OSCILLATOR, Telegraph(**options)), **NUMERICS)
 
 
 def written_mesh(path: Any) -> None:
@@ -249,7 +249,7 @@ CALLS: dict[Callable[..., Any], Mapping[str, Any]] = {
     fpsolve.OrnsteinUhlenbeck: {"alpha": 1.0, "sigma": 1.0},
     SineWiener: {"amplitude": 1.0, "sigma": 1.0},
     MarkovChain: {"states": [-1.0, 1.0], "rates": [[-1.0, 1.0], [1.0, -1.0]]},
-    solved_chain: {"amplitude": 0.5, "rate": 1.0},
+    solved_chain: {"a": 0.5, "k": 1.0},
     CoefficientMatrix: {"order": 1, "matrix": SHEAR, "g": np.sin},
     solved_plane: {"order": 1, "matrix": SHEAR, "g": np.sin},
     Jump: {"phase": 1.5, "log_factor": -0.1, "leading": None},

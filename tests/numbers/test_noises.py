@@ -52,7 +52,7 @@ LAWS = [  # a noise, its variance and its spectral density
     (Filter(omega=2.0, zeta=1.0, s=0.5, c0=0.0, c1=0.3), 0.25 / 8 * 0.09, filtered(2.0, 1.0, 0.5, 0.0, 0.3)),
     (Filter(0.8, 2.5, 0.3, 0.0, -1.0), 0.09 / 8, filtered(0.8, 2.5, 0.3, 0.0, -1.0)),
     (Telegraph(a=0.5, k=1.0), 0.25, relaxing(0.25, 2.0)),
-    (MarkovChain.telegraph(0.7, 1.9), 0.49, relaxing(0.49, 3.8)),
+    (Telegraph(0.7, 1.9), 0.49, relaxing(0.49, 3.8)),
     (RING, 38 / 7 - 49 / 12.25, None),
     (CHAIN, None, None),
 ]

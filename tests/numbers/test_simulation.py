@@ -534,7 +534,7 @@ def test_a_function_of_a_chain_is_simulated():
     loads = CoefficientMatrix(1, TURN, lambda xi: xi**3), CoefficientMatrix(1, (0.25 * np.array(TURN)).tolist(), itself)
     one, other = (
         simulate(
-            Problem(LinearSystem([CoefficientMatrix(0, NEGATIVE), load]), MarkovChain.telegraph(0.5, 1.0)),
+            Problem(LinearSystem([CoefficientMatrix(0, NEGATIVE), load]), Telegraph(0.5, 1.0)),
             [1.0],
             paths=64,
             time=60.0,
@@ -669,7 +669,7 @@ def test_equations_of_an_oscillator_respond_as_the_oscillator_does(names):
     [
         (rates("x' = v; v' = -x + 0.2*v - 0.1*x**3 - xi*x", FORCED), "hardly limit large amplitudes"),
         (spring(NOISE), "nothing limits the amplitude"),
-        (paper(c2=0.3, noise=MarkovChain.telegraph(0.5, 1.0)), "no white noise, impulses or chains"),
+        (paper(c2=0.3, noise=Telegraph(0.5, 1.0)), "no white noise, impulses or chains"),
         (paper(c2=0.3, noise=NoPaths()), "but this is a NoPaths"),
     ],
 )

@@ -11,13 +11,13 @@ from pydantic import Field
 from pydantic.fields import FieldInfo
 
 from fpsolve.arrays import FloatArray
-from fpsolve.model.faults import strict_dataclass
+from fpsolve.model.faults import TableError, shown, strict_dataclass
 from fpsolve.model.noise import Gaussian, NoiseDerivative
 from fpsolve.model.noises.steps import FilterStep, transition
 from fpsolve.model.parameters import ANY_SIGN, SIZE, Table, parameter, stated_field
 from fpsolve.model.plane import rows_of
 
-Pair = Annotated[tuple[float, float], Field(strict=False)]
+Output = Annotated[tuple[float, ...], Field(strict=False, min_length=1)]
 
 
 @strict_dataclass
@@ -54,7 +54,7 @@ class Filter(Gaussian):
     may_tilt: ClassVar[bool] = False
     variables: ClassVar[int] = 2
     stated: ClassVar[Mapping[str, FieldInfo]] = {
-        "output": stated_field(Pair, "c0 and c1 in ξ = c0 y + c1 y′", "output = [1.0, 0.0]", None)
+        "output": stated_field(Output, "c0 and c1 in ξ = c0 y + c1 y′", "output = [1.0, 0.0]", None)
     }
 
     def __post_init__(self) -> None:
@@ -69,13 +69,13 @@ class Filter(Gaussian):
             ValueError: a parameter is out of its range, c0 or c1 is stated alone, or one of them beside `output`.
         """
         known = dict(table)
-        stated = [name for name in ("c0", "c1") if name in known]
-        if "output" in known:
-            if stated:
-                raise ValueError(f"got output and {' and '.join(stated)}, which is the same twice; remove one of them")
-            known["c0"], known["c1"] = known.pop("output")
-        elif len(stated) == 1:
-            raise ValueError(f"got {stated[0]} alone; state c0 and c1, or output = [c0, c1]")
+        if output := known.pop("output", ()):
+            if known.keys() & {"c0", "c1"}:
+                raise ValueError("got output and c0 or c1, which is the same twice; remove one of them")
+            if len(output) != 2:
+                why = "y″ contains the driving white noise itself, correlated with y′"
+                raise TableError(f"got {shown(output)}; must be c0 and c1 alone, as {why}", "output")
+            known["c0"], known["c1"] = output
         return cls(**known)
 
     @property

@@ -7,6 +7,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -15,10 +16,11 @@ from pydantic.fields import FieldInfo
 from scipy.sparse.csgraph import connected_components
 
 from fpsolve.arrays import ROUNDED, FloatArray, real_array, real_number, shown
-from fpsolve.model.noise import Noise
+from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.steps import ChainStep
 from fpsolve.model.parameters import SIZE, stated_field
 from fpsolve.model.plane import rows_of
+from fpsolve.model.quantity import Quantity
 
 Row = Annotated[tuple[float, ...], Field(strict=False)]
 
@@ -107,7 +109,9 @@ class Chain(Noise):
 class MarkovChain(Chain):
     """ξ(t) jumps between given values, the states, at given rates.
 
-    >>> MarkovChain.telegraph(amplitude=0.5, rate=1.0).correlation_time  # ξ = ±0.5, each state left at rate 1
+    Its parameters are the states, such as state_1, and the rates > 0, such as rate_1_2 from state 1 to state 2.
+
+    >>> MarkovChain((-0.5, 0.5), ((-1.0, 1.0), (1.0, -1.0))).correlation_time
     0.5
 
     Args:
@@ -158,8 +162,40 @@ class MarkovChain(Chain):
         object.__setattr__(self, "states", tuple(states.tolist()))
         object.__setattr__(self, "rates", rows_of(jumps - np.diag(leaving)))
 
-    @classmethod
-    def telegraph(cls, amplitude: float, rate: float) -> MarkovChain:
-        """ξ = ±amplitude, each state left at this rate."""
-        size, rate = real_number(amplitude, "amplitude"), real_number(rate, "rate")
-        return cls((-size, size), ((-rate, rate), (rate, -rate)))
+    @cached_property
+    def _table(self) -> FloatArray:
+        """The states as a column, and right of it the rates."""
+        return np.column_stack([self.states, self.rates])
+
+    @cached_property
+    def values(self) -> Mapping[str, float | str]:
+        entries = np.ndenumerate(self._table.tolist())
+        return {f"rate_{i + 1}_{j}" if j else f"state_{i + 1}": each for (i, j), each in entries if not j or each > 0}
+
+    @property
+    def of_xi(self) -> Mapping[str, str]:
+        return {name: "{}" for name in self.values if name.startswith("state")}
+
+    def quantity_of(self, name: str) -> Quantity:
+        key, (_, *at) = f"{self.section}.{name}", name.split("_")
+        words, sign = ("rate from state {} to state {}", "q") if at[1:] else ("state {} of the noise", r"\xi")
+        return Quantity(key, key, words.format(*at), f"${sign}_{{{','.join(at)}}}$", "1/time")
+
+    def _with(self, values: Mapping[str, float | str]) -> MarkovChain:
+        table = self._table.copy()
+        for name, value in values.items():
+            table[_place(name)] = real_number(value, name)
+        np.fill_diagonal(table[:, 1:], 0.0)  # which follows
+        return MarkovChain(table[:, 0].tolist(), table[:, 1:].tolist())
+
+    def derivative(self, name: str) -> NoiseDerivative:
+        unit = np.zeros_like(self._table)
+        unit[_place(name)] = 1.0
+        states, jumps = unit[:, 0], unit[:, 1:]
+        return NoiseDerivative(states=tuple(states.tolist()), rates=rows_of(jumps - np.diag(jumps.sum(axis=1))))
+
+
+def _place(name: str) -> tuple[int, int]:
+    """Where a parameter is in the table: state_1 at (0, 0), rate_1_2 at (0, 2)."""
+    i, j = [*map(int, name.split("_")[1:]), 0][:2]
+    return i - 1, j

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from scipy.special import betaln, hyp2f1, xlog1py
 
 from fpsolve.arrays import FloatArray
 from fpsolve.model.faults import TableError, strict_dataclass
-from fpsolve.model.kinds import noise_kind
+from fpsolve.model.kinds import kind_of
 from fpsolve.model.noise import Noise, NoiseDerivative
 from fpsolve.model.noises.ornstein_uhlenbeck import GaussianNoise, Intensity, Memory
 from fpsolve.model.noises.steps import ImplicitStep, LinearStep, linear_step
@@ -71,12 +71,12 @@ class TreatedNoise(Noise):
             raise TableError(f'got "exact" beside kind = "{cls.kind}"; remove one of the two', "treatment")
         return cls(**{name: value for name, value in table.items() if name != "treatment"})
 
-    def at(self, values: Mapping[str, float | str]) -> TreatedNoise:
+    def _with(self, values: Mapping[str, float | str]) -> TreatedNoise:
         """The noise with other values of D₀, τ₀, r₀ or of its treatment, "exact" or "ou-reduction"."""
         numbers = {**self.values, **values}
         if (treatment := numbers.pop("treatment")) not in ("exact", "ou-reduction"):
             raise ValueError(f'got {treatment!r} as a treatment of the noise; must be one of "exact", "ou-reduction"')
-        return cast("TreatedNoise", noise_kind("non-gaussian" if treatment == "exact" else treatment)(**numbers))
+        return cast("Any", kind_of("noise", "non-gaussian" if treatment == "exact" else str(treatment)))(**numbers)
 
 
 @strict_dataclass

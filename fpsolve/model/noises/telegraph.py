@@ -12,6 +12,7 @@ from fpsolve.model.faults import strict_dataclass
 from fpsolve.model.noise import NoiseDerivative
 from fpsolve.model.noises.markov_chain import Chain
 from fpsolve.model.parameters import SIZE, parameter
+from fpsolve.model.plane import rows_of
 
 FLIP = ((-1.0, 1.0), (1.0, -1.0))
 """Rates of telegraph noise, in units of k."""
@@ -44,7 +45,7 @@ class Telegraph(Chain):
 
     @property
     def rates(self) -> Sequence[Sequence[float]]:
-        return tuple(tuple(self.k * each for each in row) for row in FLIP)
+        return rows_of(self.k * np.array(FLIP))
 
     @property
     def probabilities(self) -> FloatArray:

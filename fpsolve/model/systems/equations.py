@@ -35,7 +35,7 @@ from fpsolve.model.expressions import (
     product,
     summands,
 )
-from fpsolve.model.faults import TableError, table_of
+from fpsolve.model.faults import TableError
 from fpsolve.model.noises.clock import Clock, Wave
 from fpsolve.model.parameters import Section, Table, Words, parameter, stated_field, unknown_parameter, without_unit
 from fpsolve.model.plane import (
@@ -55,10 +55,6 @@ from fpsolve.model.plane import (
 from fpsolve.model.quantity import AMPLITUDE, JOINT_DENSITY, Quantity
 
 EPSILON = "epsilon"
-MOST_PARAMETERS = 200
-"""Largest number of parameters."""
-_NEWTON = 60
-"""Largest number of steps of Newton's method for the coefficient of restitution, which is cheap."""
 _COMBINED = 'a sum of several is for kind = "modes", whose masses tell how these share an impact'
 
 
@@ -156,6 +152,8 @@ class EquationSystem(System):
     quantities: tuple[tuple[str, Quantity], ...] = field(default=(), repr=False, compare=False)
 
     kind: ClassVar[str] = "equations"
+    source: ClassVar[str] = "drift"
+    """The key of what its rates are written in."""
     stated: ClassVar[Mapping[str, FieldInfo]] = {
         "variables": stated_field(Texts, "the names of the variables, one or more", 'variables = ["x", "v"]'),
         "drift": stated_field(Texts, "the rates of the variables", 'drift = ["v", "-omega**2 * x - xi * x"]'),
@@ -209,9 +207,6 @@ class EquationSystem(System):
                 raise TableError(text, "parameters", name) from None
             if name == EPSILON and not value > 0:
                 raise TableError(f"got {value:g}; must be > 0; epsilon = 1 is the unscaled system", "parameters", name)
-        if len(self.named) > MOST_PARAMETERS:
-            text = f"got {len(self.named)} parameters; must be at most {MOST_PARAMETERS}; state those that rates have"
-            raise TableError(text, "parameters")
         if not self.noises:
             raise TableError("got no noise; must be one at least; write one into drift and name it here", "noises")
         sections = [section for _, section in self.noises]
@@ -269,19 +264,8 @@ class EquationSystem(System):
         return frozenset[str]().union(*(names_in(str(wall.restitution)) for wall in self.walls))
 
     @classmethod
-    def takes(cls, key: str, table: Table) -> bool:
-        """Besides what is `stated`, keys of parameters, whose values these replace, as `--set` writes them."""
-        return key in table_of(table.get("parameters"))
-
-    @classmethod
-    def named_of(
-        cls, table: Table, stated: Mapping[str, FieldInfo]
-    ) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, Quantity], ...]]:
-        """The parameters of a table, those beside its `stated` keys in their place, and what they are.
-
-        Raises:
-            TableError: one is no number, or two have one symbol.
-        """
+    def named_of(cls, table: Table) -> tuple[tuple[tuple[str, float], ...], tuple[tuple[str, Quantity], ...]]:
+        """The parameters of a table, and what they are. Raises `TableError` where two have one symbol."""
         parameters: Mapping[str, StatedParameter] = table.get("parameters", {})
         quantities = tuple(
             (name, each.of(unknown_parameter(f"{cls.section}.{name}"))) for name, each in parameters.items()
@@ -291,18 +275,11 @@ class EquationSystem(System):
             if parameters[name].symbol and signs.count(sign) > 1:
                 text = f"got the symbol {sign} of two parameters; all must differ; choose another one"
                 raise TableError(text, "parameters", name, "symbol")
-        named = {name: each.value for name, each in parameters.items()}
-        for name in (parameters.keys() & table.keys()) - stated.keys():
-            try:
-                named[name] = real_number(table[name], name)
-            except ValueError:
-                remedy = without_unit(table[name]) or f"; write {name} = 1.0"
-                raise TableError(f"got {shown(table[name])}; must be a finite number{remedy}", name) from None
-        return tuple(named.items()), quantities
+        return tuple((name, each.value) for name, each in parameters.items()), quantities
 
     @classmethod
     def from_table(cls, table: Table) -> EquationSystem:
-        named, quantities = cls.named_of(table, cls.stated)
+        named, quantities = cls.named_of(table)
         return cls(
             variables=table["variables"],
             drift=table["drift"],
@@ -335,11 +312,7 @@ class EquationSystem(System):
     def quantity_of(self, name: str) -> Quantity:
         return dict(self.quantities).get(name) or super().quantity_of(name)
 
-    def at(self, values: Mapping[str, float | str]) -> Self:
-        known = self.values
-        for name in values:
-            if name not in known:
-                raise ValueError(f"got {name}; the parameters are {', '.join(known) or 'none'}")
+    def _with(self, values: Mapping[str, float | str]) -> Self:
         return replace(self, named=tuple({**dict(self.named), **cast("dict[str, float]", values)}.items()))
 
     @cached_property
@@ -413,7 +386,7 @@ class EquationSystem(System):
         try:
             return Clock(*common_unit(frequencies, "frequencies")) if frequencies else None
         except ValueError as failure:
-            raise TableError(str(failure), "drift" if self.drift else "stiffness") from None
+            raise TableError(str(failure), self.source) from None
 
     @cached_property
     def pasts(self) -> tuple[tuple[int, float], ...]:
@@ -499,12 +472,7 @@ class EquationSystem(System):
         if not self.walls or len(self.variables) > 2:
             return ()
         place, _, _ = self._place()
-        log_factor, leading = self._log_factor()[0], None
-        if EPSILON in self._in_walls:
-            with suppress(TableError):  # no power series
-                zeroth, first, second = self._log_factor(EPSILON, 0.0)
-                leading = zeroth + first * self.epsilon + second * self.epsilon**2
-        return (Jump(math.pi / 2 if place == 0 else 0.0, log_factor, leading),)
+        return (Jump(math.pi / 2 if place == 0 else 0.0, self._log_factor()[0]),)
 
     def _stop(self) -> Stop | None:
         """The wall of more than two variables. Raises `TableError`."""
@@ -545,16 +513,14 @@ class EquationSystem(System):
             raise TableError(f'got "{variable} = 0"; {must}, {told}; {remedy}', "walls", 0, "at")
         return i, names.index(other), speed
 
-    def _log_factor(self, by: str = "", value: float | None = None) -> tuple[float, ...]:
-        """Three Taylor coefficients of ln R of the wall by a parameter, at a value of it. Raises `TableError`."""
+    def _log_factor(self, by: str = "") -> Series:
+        """ln R of the wall and its derivative by a parameter. Raises `TableError`."""
         restitution = self.walls[0].restitution
-        named = dict(self.named) | ({} if value is None else {by: value})
         with placed("walls", 0, "restitution"):
             if isinstance(restitution, bool) or not isinstance(restitution, str | float | int):
                 must = "must be a number > 0, or an expression in the parameters"
                 raise ExpressionError(f"got {shown(restitution)}; {must}; write, for example, restitution = 0.8")
-            names = {name: constant(each, float(name == by), 0.0) for name, each in named.items()}
-            logs = log_of(str(restitution), names, "the restitution")
+            logs = log_of(str(restitution), self._values(by), "the restitution")
         return logs  # noqa: RET504
 
     @cached_property
@@ -599,25 +565,3 @@ class EquationSystem(System):
         if name not in self._derivatives:
             raise ValueError(f"the derivative of the system by {name} is not finite; choose another value of {name}")
         return self._derivatives[name]
-
-    def restitution_at(self, log_factor: float) -> tuple[str, float, float]:
-        """R; or the only parameter in it, if it is in nothing else, R is 1 where it is 1, and R grows with it.
-
-        Such a parameter is found by Newton's method; it is NaN where it is not found.
-        """
-        name = "".join(self._in_walls - {EPSILON})
-        value, known, step, slope = 1.0, math.inf, 0.0, 0.0
-        with suppress(TableError, IndexError):  # there may be no wall
-            known, slope, _ = self._log_factor(name, value)
-        if name in self._used or abs(known) > ROUNDED or not slope > 0:
-            return super().restitution_at(log_factor)
-        for _ in range(_NEWTON):
-            try:
-                known, slope, _ = self._log_factor(name, value)
-                step = (log_factor - known) / slope
-                value += step
-            except (TableError, ZeroDivisionError):  # R is not positive there, or does not change
-                step /= 2
-                value -= step
-        is_found = slope != 0 and abs(known - log_factor) <= ROUNDED * max(1.0, abs(log_factor))
-        return (name, value, 1 / slope) if is_found else (name, math.nan, math.nan)

@@ -12,42 +12,44 @@ import numpy as np
 from fpsolve.arrays import real_number, require, shown
 from fpsolve.model.faults import TableError
 from fpsolve.model.plane import (
-    MOST_VARIABLES,
     CoefficientMatrix,
     CubicTerms,
     Jump,
     LinearMotion,
     ParameterDerivative,
+    Stop,
     as_plane,
 )
 from fpsolve.model.systems.equations import EquationSystem, walls_of
 
 
 @dataclass(frozen=True)
-class PlaneSystem(LinearMotion):
-    """A linear system in the plane from its parts, see `LinearMotion`.
+class LinearSystem(LinearMotion):
+    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 1 to 200 numbers, from its parts, see `LinearMotion`.
 
     >>> from fpsolve.model import CoefficientMatrix
-    >>> PlaneSystem([CoefficientMatrix(0, ((0.0, 1.0), (-1.0, -0.2)))]).dimension
-    2
+    >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
+    >>> LinearSystem([free]).dimension
+    3
 
     Args:
-        terms: one at least.
-        jumps: stretches at rays that are passed with a speed which no noise changes, as x = 0 is where ẋ = v.
+        terms: one at least, all of the same n.
+        jumps: stretches at rays that are passed with a speed which no noise changes, as x = 0 is where ẋ = v, n = 2.
         epsilon: ε > 0.
-        cubic: what is of degree 3 in its rates, by which it has a stationary response; None for nothing.
+        stop: the wall of one coordinate, n ≥ 3.
+        cubic: what is of degree 3 in its rates, n = 2, by which it has a stationary response; None for nothing.
 
     Raises:
-        ValueError: there is no term, or ε is not a positive number.
+        ValueError: there is no term, these differ in n, ε is not a positive number, or n is none that a part is for.
     """
 
-    dimensions: ClassVar[Sequence[int]] = (2,)
-    parts: ClassVar[Sequence[str]] = ("terms", "jumps", "epsilon", "cubic")
+    parts: ClassVar[Sequence[str]] = ("terms", "jumps", "epsilon", "stop", "cubic")
 
     def __post_init__(self) -> None:
         for each in fields(LinearMotion):
             if each.name not in self.parts and vars(self)[each.name] != each.default:
                 raise TypeError(f"got {each.name}; {type(self).__name__} has {', '.join(self.parts)}; leave it out")
+        require(self.stop, Stop | None, "stop", "a Stop, or None")
         require(self.cubic, CubicTerms | None, "cubic", "CubicTerms, or None")
         for name, given, kind in (("terms", self.terms, CoefficientMatrix), ("jumps", self.jumps, Jump)):
             stated = tuple(given) if isinstance(given, Iterable) else (None,)
@@ -58,23 +60,18 @@ class PlaneSystem(LinearMotion):
         rays = np.sort(np.mod([jump.phase for jump in self.jumps], math.pi))
         if np.any(np.diff(np.append(rays, rays[:1] + math.pi)) < 1e-6) and rays.size > 1:
             raise ValueError(f"got jumps at {[jump.phase for jump in self.jumps]}; their phases must differ modulo pi")
-        if not self.terms or not (math.isfinite(self.epsilon) and self.epsilon > 0):
+        sizes = {len(term.matrix) for term in self.terms}
+        if not (sizes and math.isfinite(self.epsilon) and self.epsilon > 0):
             raise ValueError(
                 f"got {len(self.terms)} terms and epsilon = {self.epsilon}; needs one at least, and a positive number"
             )
-        sizes = sorted({len(term.matrix) for term in self.terms})
-        if len(sizes) > 1 or sizes[0] not in self.dimensions:
-            known = " to ".join(map(str, sorted({min(self.dimensions), max(self.dimensions)})))
-            raise ValueError(
-                f"got matrices of {' and '.join(map(str, sizes))} rows; {type(self).__name__} takes {known}, the same "
-                "for all terms" + ("; take LinearSystem for more" if max(sizes) > max(self.dimensions) else "")
-            )
+        if len(sizes) > 1:
+            told = " and ".join(map(str, sorted(sizes)))
+            raise ValueError(f"got matrices of {told} rows; must have as many in all terms")
+        if sizes != {2} and (self.jumps or self.cubic):
+            told = f"got jumps or cubic terms of a system of {sizes.pop()} variables"
+            raise ValueError(f"{told}; these are for two variables only: leave them out")
         object.__setattr__(self, "terms", as_plane(self.terms))
-        if self.jumps and sizes[0] != 2:
-            raise ValueError(
-                f"got {len(self.jumps)} jumps of a system of {sizes[0]} variables; jumps are for two "
-                "variables only: leave them out"
-            )
 
     @staticmethod
     def of_equations(
@@ -119,34 +116,12 @@ class PlaneSystem(LinearMotion):
     def values(self) -> Mapping[str, float | str]:
         return {"epsilon": float(self.epsilon)}
 
-    def at(self, values: Mapping[str, float | str]) -> Self:
-        for name in values:
-            if name != "epsilon":
-                raise ValueError(f"got {name}; the parameter is epsilon")
+    def _with(self, values: Mapping[str, float | str]) -> Self:
         return replace(self, epsilon=cast("float", values.get("epsilon", self.epsilon)))
 
     def derivative(self, name: str) -> ParameterDerivative:
         return ParameterDerivative(terms=self.by_epsilon())
 
 
-@dataclass(frozen=True)
-class LinearSystem(PlaneSystem):
-    """ẋ = Σ ε^k g(ξ) A x for a state x of n = 1 to 200 numbers, from its coefficient matrices; see `PlaneSystem`.
-
-    >>> from fpsolve.model import CoefficientMatrix
-    >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
-    >>> LinearSystem([free]).dimension
-    3
-
-    Args:
-        terms: one at least, all of the same n.
-        jumps: stretches at rays, for n = 2 alone.
-        epsilon: as in `PlaneSystem`.
-        stop: the wall of one coordinate, for n ≥ 3 alone.
-
-    Raises:
-        ValueError: as `PlaneSystem`, or the matrices differ in their size, or there are jumps beyond the plane.
-    """
-
-    dimensions: ClassVar[Sequence[int]] = range(1, MOST_VARIABLES + 1)
-    parts: ClassVar[Sequence[str]] = ("terms", "jumps", "epsilon", "stop")
+PlaneSystem = LinearSystem
+"""One of two variables, as most are."""

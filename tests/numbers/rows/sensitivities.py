@@ -6,6 +6,7 @@ from fpsolve import OrnsteinUhlenbeck
 from fpsolve.model import (
     Bounded,
     Filter,
+    MarkovChain,
     OrnsteinUhlenbeckByDeviation,
     OrnsteinUhlenbeckByIntensity,
     Poisson,
@@ -30,10 +31,16 @@ KINDS = (
     (Bounded, {"mu": 0.4, "nu": 1.9, "sigma": 0.5}),
     (Filter, {"omega": 1.3, "zeta": 0.4, "s": 0.5, "c0": 0.7, "c1": -0.8}),
     (Poisson, {"rate": 1.2}),
+    (
+        MarkovChain,
+        {"state_1": -0.6, "state_3": 0.8, "rate_1_2": 0.5, "rate_2_1": 0.7, "rate_2_3": 0.4, "rate_3_1": 1.1},
+    ),
 )
 
 
 def made(kind, theta):
+    if kind is MarkovChain:
+        return kind((-1, 0, 1), ((0, 1, 0), (1, 0, 1), (1, 0, 0))).at(theta)
     return kind(**theta, sizes=(-0.5, 0.7)) if kind is Poisson else kind(**theta)
 
 
