@@ -63,7 +63,7 @@ class Target:
             return moment_at(self.p)
         if self.variable:
             x = self.variable
-            return Quantity(f"{x}_squared", f"⟨{x}²⟩", f"mean of {x}²", rf"$\langle {x}^2\rangle$", "unknown")
+            return Quantity(f"{x}_squared", f"⟨{x}²⟩", f"mean of {x}²", rf"$\langle {x}^2\rangle$", f"[{x}]²")
         return LYAPUNOV_EXPONENT if self.kind == "lyapunov_exponent" else STABILITY_INDEX
 
     @property

@@ -205,12 +205,13 @@ def response_quantities(states: Sequence[str], *, has_wall: bool) -> ResponseQua
 
 
 def linear_response(states: Sequence[str]) -> ResponseQuantities:
-    """Those of a linear system, the first and second moments."""
+    """Those of a linear system, the first and second moments; [x] is the unit of x."""
     told = (
-        *((f"{x}_squared", f"{x}²") for x in states),
-        *((f"{a}_{b}", f"{a} {b}".removesuffix(" mean")) for a, b in combinations((*states, "mean"), 2)),
+        *((f"{x}_squared", f"{x}²", f"[{x}]²") for x in states),
+        *((f"{a}_{b}", f"{a} {b}", f"[{a}] [{b}]") for a, b in combinations((*states, "mean"), 2)),
     )
-    means = _means(*((name, f"⟨{each}⟩", f"mean of {each}", "unknown") for name, each in told))
+    named = ((name, each.removesuffix(" mean"), unit.removesuffix(" [mean]")) for name, each, unit in told)
+    means = _means(*((name, f"⟨{each}⟩", f"mean of {each}", unit) for name, each, unit in named))
     return replace(OSCILLATOR_RESPONSE, means=means, has_wall=False)
 
 

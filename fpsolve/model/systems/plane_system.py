@@ -27,7 +27,7 @@ from fpsolve.model.systems.equations import EquationSystem, walls_of
 class LinearSystem(LinearMotion):
     """ẋ = Σ ε^k g(ξ) A x for a state x of n = 1 to 200 numbers, from its parts, see `LinearMotion`.
 
-    >>> from fpsolve.model import CoefficientMatrix
+    >>> from fpsolve.model import CoefficientMatrix, LinearSystem
     >>> free = CoefficientMatrix(0, ((0, 1, 0), (-1, -0.2, 0.5), (0, -0.5, -1)))  # an oscillator with a voltage
     >>> LinearSystem([free]).dimension
     3
