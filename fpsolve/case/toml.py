@@ -8,6 +8,7 @@ from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
@@ -181,7 +182,7 @@ class Document:
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
             value = get(loads(text), key := dotted(assigned[0]))
-            place = key if isinstance(value, dict) else place_of(self.data, key)
+            place = place_of(self.data, key).removesuffix(".value" * isinstance(value, dict))
             put(self.data, place, value)
         except RecursionError:
             self.faults.append(Fault(typed, None, _TOO_DEEP))
@@ -189,11 +190,10 @@ class Document:
             examples = "--set oscillator.omega=2.0 or --set 'oscillator.impact=\"delta\"'"
             self.faults.append(Fault(typed, None, f"{error}; write it as in {examples}"))
         else:
-            path = place.split(".")
             self.places = {key: each for key, each in self.places.items() if not key.startswith(f"{place}.")}
             self.places[place] = Place(typed=typed)
-            for end in range(1, len(path)):
-                self.places.setdefault(".".join(path[:end]), Place(typed=typed))
+            for around in accumulate(place.split("."), "{}.{}".format):
+                self.places.setdefault(around, Place(typed=typed))
 
 
 def _quoted_if_bare(text: str) -> str:

@@ -170,7 +170,7 @@ def _with_theory(case: Case, count: int) -> set[int]:
 
 def _moment_series(case: Case, result: SetResult, *, with_theory: bool) -> Series:
     p = result.moments.p
-    first, last = float(p.min(initial=math.inf)), float(p.max(initial=-math.inf))
+    first, last = p.min(initial=math.inf), p.max(initial=-math.inf)
     line = np.linspace(first, last, 200) if with_theory and p.size else _NOTHING
     root, slope = (
         found.value if each.name in case.figure.mark and (found := result.estimates[each.name]) else None
@@ -181,7 +181,7 @@ def _moment_series(case: Case, result: SetResult, *, with_theory: bool) -> Serie
         p,
         result.moments.value,
         line,
-        perturbed_moments(result.parameter_set.problem, line),
+        perturbed_moments(result.parameter_set.problem, line) if line.size else _NOTHING,
         root if root is not None and first <= root <= last else None,
         slope if first <= 0 <= last else None,
     )

@@ -79,17 +79,17 @@ def test_figure_over_a_parameter_has_what_is_simulated(tmp_path):
         assert run(tmp_path, "run", "case.toml", "--jobs", "1", "--monte-carlo", figure, case=text).code == 0
     assert {"figure.png", "figure.pdf"} <= files(tmp_path / "results/case")
     impossible = "vary={ 'oscillator.epsilon' = [0.1, 1.5], 'oscillator.restitution' = [0.1] }"
-    figure = '--set=figure={ x = "oscillator.epsilon", y = { moment = 2.0 } }'
     more = "--set", "oscillator.impact='restitution'", "--set", impossible, "--out", "other"
-    assert run(tmp_path, "run", "case.toml", "--jobs", "1", figure, *more, case=text).code == 3
-    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "other/case")
+    for figure in ('{ x = "oscillator.epsilon", y = { moment = 2.0 } }', "{}"):
+        assert run(tmp_path, "run", "case.toml", "--jobs", "1", f"--set=figure={figure}", *more, case=text).code == 3
+        assert "figure.png" in files(tmp_path / "other/case")
 
 
 def test_many_curves_of_one_moment_are_dots(tmp_path):
     text = TEXT.replace("figure = false", "figure = true")
     many = ['--set=vary."noise.D0"={ start = 0.1, stop = 1.0, num = 12 }', "--set=moments.p=[2.0]"]
     assert run(tmp_path, "run", "case.toml", "--jobs", "1", *many, case=text).code == 0
-    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "results/case")
+    assert "figure.png" in files(tmp_path / "results/case")
 
 
 def test_eigenfunction_of_states_has_a_picture_in_python(pictures):
