@@ -136,7 +136,7 @@ HOSTILE = {
     "long value": (f"fpsolve run --set {'a' * 10**5} case.toml", LIGHT),
     "long option": (f"fpsolve run --{'a' * 10**5} case.toml", LIGHT),
     "no JIT": ("NUMBA_DISABLE_JIT=1 fpsolve simulate case.toml", LIGHT),
-    "no home": (f"MPLCONFIGDIR=/proc/none HOME=/proc/none {RUN}", LIGHT),
+    "no home": ("MPLCONFIGDIR=/proc/none NUMBA_CACHE_DIR=/proc/none HOME=/proc/none fpsolve simulate case.toml", LIGHT),
     "Chinese": (RUN, LIGHT.replace("A test", "\\u632f\\u52a8")),
 }
 """By their names the words of the command, and what its file holds, which is the last of them."""

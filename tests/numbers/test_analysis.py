@@ -226,7 +226,6 @@ def test_simulated_paths_exceed_a_level_within_the_bounds():
 
 
 HIGH = 1e-11
-OWN = "x' = v; v' = -omega**2*x - 2*zeta*omega*v - epsilon*xi*x"
 
 
 def oscillator(noise, **values):
@@ -254,27 +253,6 @@ def difference(problem, key, value):
     h = 1e-4 * max(abs(problem.values[key]), 0.1)
     values = [value(problem.at({key: problem.values[key] + k * h})) for k in (-2, -1, 1, 2)]
     return np.dot(values, [1, -8, 8, -1]) / (12 * h)
-
-
-@pytest.mark.parametrize(
-    ("problem", "p"),
-    [
-        (oscillator(EXACT), 1.7),
-        (rates(OWN, Telegraph(a=0.7, k=0.6), omega=1.2, zeta=0.1, epsilon=0.6), 1.0),
-        *sampled(
-            (oscillator(EXACT.ou_reduction(), impact="restitution"), -2.3),
-            (oscillator(EXACT, epsilon=0.05, c1=-0.3), 3.1),
-            keep=0,
-        ),
-    ],
-)  # fmt: skip
-def test_sensitivities_of_a_moment_are_differences(problem, p):
-    [found] = sensitivities(problem, p, rtol=HIGH).moments
-    assert found.keys() == set(problem.differentiable)
-    for key, estimate in found.items():
-        expected = difference(problem, key, of_moment(p))
-        assert estimate.value == pytest.approx(expected, rel=1e-6, abs=1e-7), key
-        assert estimate.error_estimate < 1e-4 * max(1e-2, abs(expected)), key
 
 
 def test_index_of_two_parts_that_do_not_mix_has_no_sensitivities():

@@ -158,12 +158,6 @@ KNOWN = {
         matrices(((1.0, 0.0), (0.0, -1.0)), TURN, White(s=1.0)),
         {None: lambda: float(closed_forms.saddle_and_turning()[0])},
     ),
-    "Gaussian, by populations": Simulated(
-        spring(OrnsteinUhlenbeck(1.0, 0.5), 0.1),
-        {2: lambda: by_moments(KNOWN["Gaussian, by populations"].problem, 2, 60)},
-        estimator="population",
-        time=200.0,
-    ),
     "Gaussian, without loss": Simulated(
         paper(0.7, OrnsteinUhlenbeck(1.0, 1.0), restitution=1.0, c1=0.2),
         {-2: 0.49 * (0.5 - 0.2)},
@@ -407,20 +401,6 @@ def test_an_interrupt_before_two_transients_is_raised():
 
     with pytest.raises(KeyboardInterrupt):
         simulate(paper(), [1.0], paths=64, time=20.0, progress=progress)
-
-
-@pytest.mark.parametrize("estimator", ["direct", "population"])
-def test_an_oscillator_written_as_matrices_gives_the_same_numbers(estimator):
-    """Term by term, with the wall in its place: the same random numbers give the same estimates."""
-    first = paper(0.1)
-    terms, jumps = first.system.terms, first.system.jumps
-    settings = {"estimator": estimator, "paths": 640, "time": 20.0, "seed": 4}
-    one, other = (
-        simulate(each, [1.0], **settings) for each in (first, Problem(PlaneSystem(terms, jumps, 0.1), REDUCED))
-    )
-    assert (one.step, one.impacts, one.lyapunov_exponent) == (other.step, other.impacts, other.lyapunov_exponent)
-    assert one.estimates == other.estimates
-    assert one.impacts == pytest.approx(640 * one.time / math.pi, rel=0.02)
 
 
 @pytest.mark.slow
