@@ -71,7 +71,6 @@ class Design(Result):
         by: the ranges of the parameters.
         values: of the parameters by their keys; the error is by how much the nearest exact value may be off.
         found: the quantity there.
-        units: of the change of each parameter.
         solves: how many solves it took.
     """
 
@@ -81,14 +80,13 @@ class Design(Result):
     by: tuple[Axis, ...]
     values: Mapping[str, Estimate]
     found: Estimate
-    units: Mapping[str, float]
     solves: int
 
     @property
     def distance(self) -> float:
-        """√(Σ xᵢ²), x the changes of the parameters in their units."""
-        changes = (each.value - float(self.start.values[key]) for key, each in self.values.items())
-        return math.hypot(*(change / unit for change, unit in zip(changes, self.units.values(), strict=True)))
+        """√(Σ xᵢ²), x the changes of the parameters over their values."""
+        units, start = units_of(self.start, self.by), self.start.values
+        return math.hypot(*((self.values[key].value - float(start[key])) / unit for key, unit in units.items()))
 
     def to_xarray(self) -> xarray.Dataset:
         """The values of the parameters, with their errors, and the quantity."""
@@ -135,11 +133,10 @@ def design(
     """
     require(by, Axis | Sequence, "by", 'a parameter such as "noise.D0", an Axis, or a list of these')
     wanted, axes = target_of(target), axes_of(problem, by)
-    measures = units_of(problem, axes)
     rtol, keys = choose(problem).line_rtol(wanted.order), [axis.key for axis in axes]
     distance = Distance(problem, wanted, keys, rtol=rtol, budget=budget or Budget())
     tried, here = _Tried(distance, progress), np.array([float(problem.values[axis.key]) for axis in axes])
-    unit = np.array([*measures.values()])
+    unit = np.array([*units_of(problem, axes).values()])
     found = _nearest(tried, wanted, axes, here, unit)
     if isinstance(found, Absent):
         return found
@@ -158,7 +155,6 @@ def design(
             for axis, value, error in zip(axes, found.at, errors, strict=True)
         },
         found=distance.found(found),
-        units=measures,
         solves=tried.solves,
     )
 

@@ -37,7 +37,7 @@ _TARGET = re.compile(
 class Target:
     """A quantity and the value that is wanted of it; F is by how much it is larger, of δ_p Λ(p)/p at the value.
 
-    Of a mean square F = 1 − v/⟨x²⟩, which is 1 where Λ(2) ≥ 0 and ⟨x²⟩ is infinite.
+    Of a mean square F = 1 − 2v/(⟨x²⟩ + v), from −1 to 1, which it is where Λ(2) ≥ 0 and ⟨x²⟩ is infinite.
 
     Attributes:
         kind: of the quantity.
@@ -84,7 +84,7 @@ class Target:
     def at(self, value: float) -> float:
         """The quantity where F has a value; of δ_p Λ(p)/p."""
         if self.variable:
-            return self.value / (1 - value) if value < 1 else math.inf
+            return self.value * (2 / (1 - value) - 1) if value < 1 else math.inf
         return self.level + value
 
     def side(self, value: float) -> str:
@@ -192,14 +192,15 @@ class Distance:
                 return 1.0, 0.0
             raise
         row = self.problem.linear.states.index(self.target.variable)
-        square, error = moments.square[row, row], moments.errors[row, row]
-        return 1 - self.target.value / square, self.target.value * error / square**2
+        twice = 2 * self.target.value
+        share = twice / (moments.square[row, row] + self.target.value)
+        return 1 - share, share**2 * moments.errors[row, row] / twice
 
     def found(self, sample: Sample) -> Estimate:
         """The quantity at θ. Raises `NotConverged`."""
         value, error, scale = self.target.at(sample.value), sample.error, sample.scale
         if self.target.variable:
-            error, scale = error * value**2 / self.target.value, value
+            error, scale = self.target.at(sample.value + error) - value, value
         if self.target.kind == "stability_index":
             ratio, slope, error = self.method(sample.at).ratio(self.target.value)
             value, error, scale = self.target.value - ratio / slope, error / slope, 1.0

@@ -114,3 +114,11 @@ def test_line_of_a_mean_square_is_that_of_its_closed_form():
     assert np.all(np.abs(off) <= 1e-8)
     assert np.ptp(branch.x) > 0.5
     assert np.all(branch.width < 1e-8)
+
+
+def test_sides_of_the_line_of_a_mean_square_are_those_of_its_closed_form():
+    """In weak noise, too, where ⟨x²⟩ is a hundredth of what it is on the line."""
+    line = boundary(loaded(), "square(x) = 0.01", Axis("system.c", 0.1, 0.6), Axis("noise.s", 0.02, 2.0))
+    at = np.linspace(0, 1, 99)
+    c, s = 0.1 + 0.5 * at[:, None], 0.02 + 1.98 * at
+    assert np.mean((line.scan.on(at) > 0) == (4.09 * s**2 > 2 * c)) > 0.99
