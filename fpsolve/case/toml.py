@@ -182,7 +182,7 @@ class Document:
             if len(assigned) != 1:
                 raise ValueError(f"must be one key=value, but there are {len(assigned)} here")
             value = get(loads(text), key := dotted(assigned[0]))
-            place = place_of(self.data, key).removesuffix(".value" * isinstance(value, dict))
+            place = place_of(self.data, key).removesuffix(".value" * isinstance(value, dict))  # a table for a table
             put(self.data, place, value)
         except RecursionError:
             self.faults.append(Fault(typed, None, _TOO_DEEP))

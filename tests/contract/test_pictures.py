@@ -27,6 +27,8 @@ SHAKEN = Problem(
     VibroImpactOscillator(omega=1.0, restitution=0.3, c1=0.1, epsilon=0.5), NonGaussianNoise(D0=0.5, tau0=1.0, r0=0.9)
 )
 
+DRAWN = {"figure.png", "figure.pdf"}
+
 
 def colours(png):
     content = matplotlib.image.imread(png)[:, :, :3]
@@ -77,19 +79,19 @@ def test_figure_over_a_parameter_has_what_is_simulated(tmp_path):
     for y in ("{ moment = 2.0 }", '"lyapunov_exponent"'):
         figure = f'--set=figure={{ x = "noise.D0", y = {y} }}'
         assert run(tmp_path, "run", "case.toml", "--jobs", "1", "--monte-carlo", figure, case=text).code == 0
-    assert {"figure.png", "figure.pdf"} <= files(tmp_path / "results/case")
-    impossible = "vary={ 'oscillator.epsilon' = [0.1, 1.5], 'oscillator.restitution' = [0.1] }"
-    more = "--set", "oscillator.impact='restitution'", "--set", impossible, "--out", "other"
+    assert files(tmp_path / "results/case") >= DRAWN
+    impossible = "--set=vary={ 'oscillator.epsilon' = [0.1, 1.5], 'oscillator.restitution' = [0.1] }"
+    more = "--set=oscillator.impact='restitution'", impossible, "--out", "other"
     for figure in ('{ x = "oscillator.epsilon", y = { moment = 2.0 } }', "{}"):
         assert run(tmp_path, "run", "case.toml", "--jobs", "1", f"--set=figure={figure}", *more, case=text).code == 3
-        assert "figure.png" in files(tmp_path / "other/case")
+        assert files(tmp_path / "other/case") >= DRAWN
 
 
 def test_many_curves_of_one_moment_are_dots(tmp_path):
     text = TEXT.replace("figure = false", "figure = true")
     many = ['--set=vary."noise.D0"={ start = 0.1, stop = 1.0, num = 12 }', "--set=moments.p=[2.0]"]
     assert run(tmp_path, "run", "case.toml", "--jobs", "1", *many, case=text).code == 0
-    assert "figure.png" in files(tmp_path / "results/case")
+    assert files(tmp_path / "results/case") >= DRAWN
 
 
 def test_eigenfunction_of_states_has_a_picture_in_python(pictures):
